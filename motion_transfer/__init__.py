@@ -1,0 +1,43 @@
+"""One photo of a person plus the motion of another becomes a video.
+
+>>> from motion_transfer import render_video
+>>> render_video(source="me.jpg", driver="dance_iuv/", output="me_dancing.mp4")
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from motion_transfer.version import __version__
+
+if TYPE_CHECKING:
+    from motion_transfer.api import render_video
+    from motion_transfer.errors import MotionTransferError
+    from motion_transfer.render.options import Garment, RenderOptions
+    from motion_transfer.render.run import RenderReport
+
+__all__ = [
+    "Garment",
+    "MotionTransferError",
+    "RenderOptions",
+    "RenderReport",
+    "__version__",
+    "render_video",
+]
+
+_HOMES = {
+    "Garment": "motion_transfer.render.options",
+    "MotionTransferError": "motion_transfer.errors",
+    "RenderOptions": "motion_transfer.render.options",
+    "RenderReport": "motion_transfer.render.run",
+    "render_video": "motion_transfer.api",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used, so that `mt --help` need not load torch."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(_HOMES[name]), name)

@@ -1,0 +1,1 @@
+"""The command line: parse, call, report. One module per command; none of them computes."""

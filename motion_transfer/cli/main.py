@@ -1,0 +1,84 @@
+"""The `mt` command: a group that loads each subcommand when it is called."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from importlib import import_module
+from types import FrameType
+
+import click
+
+from motion_transfer.errors import MotionTransferError
+from motion_transfer.version import __version__
+
+COMMANDS = {
+    "run": "Render the person of a photo in the motion of a driver.",
+    "demo": "Render a photo and a driver that ship with the program.",
+    "inspect": "Say what an IUV file, driver, photo or weights file holds.",
+    "info": "Versions, device, renderers, sizes of a run; part names.",
+}
+INTERRUPTED = 130
+TERMINATED = 143
+
+
+class LazyGroup(click.Group):
+    """Knows its commands by name and imports only the one that is used: help stays instant."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        return getattr(import_module(f"motion_transfer.cli.{cmd_name}"), cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, "-V", "--version", message="motion-transfer %(version)s")
+def cli() -> None:
+    """One photo of a person plus the motion of another becomes a video.
+
+    \b
+    mt demo
+    mt run --source photo.png --driver iuv_frames/ -o out.mp4
+    """
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, handled like Ctrl-C but for the exit code."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; every failure becomes one line on stderr and an exit code."""
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        cli.main(args=arguments, prog_name="mt", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except MotionTransferError as error:
+        click.echo(f"mt: {error}", err=True)
+        return error.exit_code
+    except Terminated:
+        click.echo("mt: terminated, nothing was left behind", err=True)
+        return TERMINATED
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("mt: interrupted, nothing was left behind", err=True)
+        return INTERRUPTED
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    return 0
+
+
+def entry_point() -> None:
+    """What the installed `mt` script calls."""
+    sys.exit(main())
+
+
+def _terminate(_signal: int, _frame: FrameType | None) -> None:
+    raise Terminated

@@ -1,0 +1,41 @@
+"""What can go wrong, as types; the command line turns each into one line and an exit code.
+
+    MotionTransferError                 exit code
+    ├── InputError                      2   something the user gave cannot be used
+    │   ├── IuvFileError                2   a file or frame that is not an IUV image
+    │   ├── WeightsError                2   a file that is not a whole checkpoint
+    │   └── OutputError                 2   a place or format that cannot be written
+    └── RenderError                     1   work that failed though its input was accepted
+
+Messages say what was wrong, where, and what to do next.
+"""
+
+from __future__ import annotations
+
+
+class MotionTransferError(Exception):
+    """Base of everything this package raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(MotionTransferError):
+    """An argument, or a file that an argument names, cannot be used."""
+
+    exit_code = 2
+
+
+class IuvFileError(InputError):
+    """A file, or one frame of a driver, is not an IUV image."""
+
+
+class WeightsError(InputError):
+    """A weights file is missing, truncated, or not a checkpoint of this model."""
+
+
+class OutputError(InputError):
+    """The output's place, format or codec cannot be written."""
+
+
+class RenderError(MotionTransferError):
+    """Rendering failed after its input had been accepted."""

@@ -1,0 +1,1 @@
+"""Reading and writing images, IUV streams and video; nothing else in the package touches files."""

@@ -1,0 +1,73 @@
+"""Photos in, pictures out."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+from motion_transfer.errors import InputError
+
+
+@dataclass(frozen=True)
+class Photo:
+    """An upright picture.
+
+    Attributes:
+        rgb: H x W x 3 uint8, not multiplied by alpha.
+        alpha: H x W uint8 where the file has one, else None.
+        turned: the file's EXIF orientation had to be applied.
+    """
+
+    path: Path
+    rgb: UInt8[np.ndarray, "H W 3"]
+    alpha: UInt8[np.ndarray, "H W"] | None
+    turned: bool
+
+
+def read_bytes(path: Path, what: str) -> bytes:
+    """A file's content. Raises: InputError naming what the file was wanted for."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{what} {path} does not exist") from None
+    except OSError as error:
+        raise InputError(f"{what} {path} cannot be read: {error.strerror}") from error
+
+
+def read_photo(path: Path, what: str = "source") -> Photo:
+    """Read a picture of any common format, turned upright as its EXIF data says.
+
+    Raises: InputError if it is missing, unreadable, truncated or not a picture.
+    """
+    data = read_bytes(path, what)
+    try:
+        with Image.open(io.BytesIO(data)) as file:
+            turned = file.getexif().get(0x0112, 1) not in (0, 1)
+            image = ImageOps.exif_transpose(file)
+            if image.mode.startswith("I"):  # 16-bit grey; convert() would clip, not scale
+                grey = np.asarray(image).astype(np.uint32) >> 8
+                image = Image.fromarray(grey.astype(np.uint8))
+            transparent = "A" in image.mode or "transparency" in image.info
+            pixels = np.asarray(image.convert("RGBA" if transparent else "RGB"))
+    except UnidentifiedImageError:
+        raise InputError(f"{what} {path} is not a picture in a known format") from None
+    except Image.DecompressionBombError as error:
+        raise InputError(f"{what} {path} is too large: {error}; scale it down first") from error
+    except (OSError, SyntaxError, ValueError) as error:
+        raise InputError(f"{what} {path} is damaged: {error}; save it again") from error
+    alpha = pixels[..., 3].copy() if transparent else None
+    return Photo(path=path, rgb=np.ascontiguousarray(pixels[..., :3]), alpha=alpha, turned=turned)
+
+
+def write_png(path: Path, rgb: UInt8[np.ndarray, "H W 3"]) -> None:
+    """Write a picture as PNG. Raises: OSError."""
+    ok, encoded = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+    if not ok:
+        raise OSError(f"cannot encode a PNG of {rgb.shape}")
+    path.write_bytes(encoded.tobytes())

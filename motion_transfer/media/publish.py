@@ -1,0 +1,107 @@
+"""Writing so that a final name only ever holds something whole."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from motion_transfer.errors import OutputError
+
+
+def check_destination(path: Path, *, force: bool) -> None:
+    """Refuse a destination before any work is done.
+
+    Raises: OutputError if it exists and `force` is off, or if its folder cannot be written.
+    """
+    if path.exists() and not force:
+        raise OutputError(f"{path} exists already; choose another name or add --force")
+    if path.is_dir() and any(not _is_frame(item) for item in path.iterdir()):
+        raise OutputError(
+            f"{path} is a folder with other things than frames in it, and is not replaced even"
+            " with --force; choose another name"
+        )
+    parent = path.absolute().parent
+    existing = next(folder for folder in (parent, *parent.parents) if folder.exists())
+    if not existing.is_dir():
+        raise OutputError(f"cannot write {path}: {existing} is not a folder")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write {path}: no permission to write in {existing}")
+
+
+@contextmanager
+def work_folder(final: Path) -> Iterator[Path]:
+    """A hidden folder beside `final`, on the same file system, gone when the block ends.
+
+    Raises: OutputError where the disk is full or the place cannot be written.
+    """
+    made: list[Path] = []
+    with explain_disk_errors(final):
+        parent = final.absolute().parent
+        for folder in (parent, *parent.parents):
+            if folder.exists():
+                break
+            made.append(folder)
+        parent.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f".{final.name}.work-", dir=parent))
+    try:
+        with explain_disk_errors(final):
+            yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if not final.exists():
+            for folder in made:
+                try:
+                    folder.rmdir()
+                except OSError:  # somebody else put something there meanwhile: theirs to keep
+                    break
+
+
+@contextmanager
+def explain_disk_errors(final: Path) -> Iterator[None]:
+    """Turn the operating system's refusal to write `final` into one of ours."""
+    try:
+        yield
+    except OSError as error:
+        reasons = {
+            errno.ENOSPC: "the disk is full; free some space or write elsewhere",
+            errno.EDQUOT: "the disk quota is used up; free some space or write elsewhere",
+            errno.EFBIG: "the file would exceed the largest size allowed here",
+            errno.EACCES: "no permission; write elsewhere",
+            errno.EPERM: "no permission; write elsewhere",
+            errno.EROFS: "the file system is read-only; write elsewhere",
+            errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
+        }
+        if error.errno not in reasons:
+            raise
+        raise OutputError(f"cannot write {final}: {reasons[error.errno]}") from error
+
+
+def publish(finished: Path, final: Path) -> None:
+    """Move a finished file or folder of files onto its final name, durably."""
+    for file in sorted(finished.iterdir()) if finished.is_dir() else [finished]:
+        _sync(file)
+    if final.is_dir():  # a folder cannot be replaced in one step: the old one steps aside first
+        old = Path(tempfile.mkdtemp(prefix=f".{final.name}.old-", dir=final.parent))
+        os.replace(final, old / final.name)
+        os.replace(finished, final)
+        shutil.rmtree(old)
+    else:
+        os.replace(finished, final)
+    _sync(final.absolute().parent)
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _is_frame(path: Path) -> bool:
+    return path.suffix == ".png" and path.stem.isdigit()

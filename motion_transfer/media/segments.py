@@ -1,0 +1,196 @@
+"""Chunks become segments, segments become the output.
+
+A segment is a chunk's frames, encoded on their own by a single-threaded encoder: one closed group
+of pictures, so that segments can be joined by copying packets and the result's bytes depend on the
+chunks only. Time inside segments is counted in frames, exactly.
+"""
+
+from __future__ import annotations
+
+import shutil
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import av
+import numpy as np
+from av.video.reformatter import ColorRange, Colorspace, Interpolation
+from jaxtyping import UInt8
+
+from motion_transfer.media.formats import OutputFormat
+from motion_transfer.media.gif import write_gif
+from motion_transfer.media.image import write_png
+
+SEGMENT_CONTAINER = "nut"  # takes every codec, and any frame rate without rounding
+BT709 = 1  # H.273's number for primaries, transfer and matrix
+
+
+class SegmentWriter(ABC):
+    """Takes the frames of one chunk; a context manager that finishes the segment on a clean exit."""
+
+    @abstractmethod
+    def write(self, frame: UInt8[np.ndarray, "H W 3"]) -> None:
+        """Append a frame."""
+
+    def close(self) -> None:
+        """Finish the segment."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class FrameSegment(SegmentWriter):
+    """A folder of PNG, numbered through the whole output."""
+
+    def __init__(self, path: Path, first: int) -> None:
+        path.mkdir()
+        self._path = path
+        self._index = first
+
+    def write(self, frame: UInt8[np.ndarray, "H W 3"]) -> None:
+        write_png(self._path / f"{self._index:06d}.png", frame)
+        self._index += 1
+
+
+class VideoSegment(SegmentWriter):
+    """A closed group of pictures in an intermediate container."""
+
+    def __init__(
+        self, path: Path, output_format: OutputFormat, size: tuple[int, int], rate: Fraction
+    ) -> None:
+        codec = output_format.codec
+        self._container = av.open(str(path), "w", format=SEGMENT_CONTAINER)
+        options = dict(codec.options)
+        if output_format.crf is not None:
+            options["crf"] = str(output_format.crf)
+        self._stream = self._container.add_stream(codec.encoder, rate=rate, options=options)
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = codec.pixel_format
+        context = self._stream.codec_context
+        context.thread_count = 1
+        context.time_base = 1 / rate
+        context.gop_size = 10_000  # one group of pictures a segment; scene cuts may add more
+        self._rgb = codec.pixel_format.startswith("gbr")
+        if not self._rgb:
+            context.colorspace = context.color_primaries = context.color_trc = BT709
+            context.color_range = ColorRange.MPEG
+        self._index = 0
+
+    def write(self, frame: UInt8[np.ndarray, "H W 3"]) -> None:
+        picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
+        picture = (
+            picture.reformat(format="gbrp")
+            if self._rgb
+            else picture.reformat(
+                format=self._stream.pix_fmt,
+                dst_colorspace=Colorspace.ITU709,
+                dst_color_range=ColorRange.MPEG,
+                interpolation=Interpolation.AREA,
+            )
+        )
+        picture.pts = self._index
+        picture.time_base = self._stream.codec_context.time_base
+        self._index += 1
+        self._container.mux(self._stream.encode(picture))
+
+    def close(self) -> None:
+        try:
+            self._container.mux(self._stream.encode(None))
+        finally:
+            self._container.close()
+
+
+def segment_path(folder: Path, index: int, output_format: OutputFormat) -> Path:
+    """Where the segment of a chunk lies in the work folder."""
+    suffix = ".nut" if output_format.kind in ("video", "gif") else ""
+    return folder / f"{index:06d}{suffix}"
+
+
+def open_segment(
+    path: Path,
+    output_format: OutputFormat,
+    *,
+    size: tuple[int, int],
+    rate: Fraction,
+    first: int,
+) -> SegmentWriter:
+    """A writer for one chunk. `size` is (width, height), `first` the chunk's first frame."""
+    if output_format.kind in ("frames", "image"):
+        return FrameSegment(path, first)
+    return VideoSegment(path, output_format, size, rate)
+
+
+def join_segments(
+    segments: Sequence[tuple[Path, int]],
+    destination: Path,
+    output_format: OutputFormat,
+    rate: Fraction,
+) -> None:
+    """Make the output of finished segments, given with the number of frames in each."""
+    if output_format.kind == "frames":
+        destination.mkdir()
+        for folder, _ in segments:
+            for file in folder.iterdir():
+                file.rename(destination / file.name)
+    elif output_format.kind == "image":
+        shutil.move(next(segments[0][0].iterdir()), destination)
+    elif output_format.kind == "gif":
+        write_gif([path for path, _ in segments], destination, rate)
+    else:
+        _copy_packets(segments, destination, output_format, rate)
+
+
+def _copy_packets(
+    segments: Sequence[tuple[Path, int]],
+    destination: Path,
+    output_format: OutputFormat,
+    rate: Fraction,
+) -> None:
+    options = {"movflags": "+faststart"} if destination.suffix in (".mp4", ".mov") else {}
+    orders = [_showing_order(path, rate) for path, _ in segments]
+    delay = max(index - number for order in orders for index, number in enumerate(order))
+    with av.open(str(destination), "w", options=options) as output:
+        stream = None
+        first = 0
+        for (path, frame_count), order in zip(segments, orders, strict=True):
+            with av.open(str(path)) as segment:
+                template = segment.streams.video[0]
+                if stream is None:
+                    stream = output.add_stream_from_template(template, opaque=True)
+                    stream.time_base = 1 / rate
+                    if output_format.codec.tag and destination.suffix in (".mp4", ".mov"):
+                        stream.codec_context.codec_tag = output_format.codec.tag
+                for index, (packet, number) in enumerate(
+                    zip(_packets(segment), order, strict=True)
+                ):
+                    packet.pts = first + number
+                    packet.dts = first + index - delay
+                    packet.duration = 1
+                    packet.time_base = 1 / rate
+                    packet.stream = stream
+                    output.mux(packet)
+            first += frame_count
+
+
+def _showing_order(path: Path, rate: Fraction) -> list[int]:
+    """The frame number in its segment of each packet, in decoding order."""
+    with av.open(str(path)) as segment:
+        numbers = [round(p.pts * p.time_base * rate) for p in _packets(segment)]
+    start = min(numbers)  # the container shifts time so that decoding begins at 0
+    return [number - start for number in numbers]
+
+
+def _packets(segment: av.container.InputContainer) -> Iterator[av.Packet]:
+    """Packets in decoding order, one a frame; what follows them to flush a decoder is left out."""
+    return (packet for packet in segment.demux(video=0) if packet.size)

@@ -1,0 +1,106 @@
+"""From a rendered crop to an output frame: background, paste, side by side."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from motion_transfer.render.options import parse_colour
+from motion_transfer.render.source import Source
+from motion_transfer.render.window import Window
+
+PERSON_GROWTH = 0.05  # of the person's height: hair and clothes reach beyond the IUV by about that
+PART_COLOUR_STEP = 10  # 24 parts over 0..240, as DensePose draws them
+
+Frame = UInt8[np.ndarray, "H W 3"]
+
+
+def make_background(
+    background: str, size: tuple[int, int], source: Source, *, in_place: bool
+) -> Frame:
+    """A background of (height, width): one colour, or the source's photo.
+
+    The photo covers the frame, centred, and loses its person, whose place is inpainted; with
+    `in_place` (the driver is the source's own IUV) it stays as it is.
+    """
+    height, width = size
+    colour = parse_colour(background)
+    if colour is not None:
+        return np.full((height, width, 3), colour, np.uint8)
+    photo = source.photo.rgb
+    if not in_place:
+        photo = remove_person(photo, source.iuv)
+    scale = max(height / photo.shape[0], width / photo.shape[1])
+    covering = (
+        max(width, round(photo.shape[1] * scale)),
+        max(height, round(photo.shape[0] * scale)),
+    )
+    if covering != photo.shape[1::-1]:
+        kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+        photo = cv2.resize(photo, covering, interpolation=kind)
+    top, left = (photo.shape[0] - height) // 2, (photo.shape[1] - width) // 2
+    return np.ascontiguousarray(photo[top : top + height, left : left + width])
+
+
+def remove_person(photo: Frame, iuv: UInt8[np.ndarray, "H W 3"]) -> Frame:
+    """The photo with its person painted over from around."""
+    mask = cv2.min(np.ascontiguousarray(iuv[..., 0]), 1)
+    rows = np.flatnonzero(mask.any(1))
+    radius = max(2, round((rows[-1] - rows[0] + 1) * PERSON_GROWTH))
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    scale = min(1, 512 / max(photo.shape[:2]))  # the fill is smooth, and slow at full size
+    small_size = (max(1, round(photo.shape[1] * scale)), max(1, round(photo.shape[0] * scale)))
+    grown = cv2.dilate(mask, kernel)
+    small = cv2.resize(photo, small_size, interpolation=cv2.INTER_AREA)
+    small_mask = cv2.resize(grown, small_size, interpolation=cv2.INTER_AREA)
+    small_mask = cv2.dilate(small_mask, np.ones((3, 3), np.uint8))
+    filled = cv2.inpaint(small, small_mask, 5, cv2.INPAINT_TELEA)
+    filled = cv2.resize(filled, photo.shape[1::-1], interpolation=cv2.INTER_CUBIC)
+    return np.where(grown[..., None] > 0, filled, photo)
+
+
+def paste(frame: Frame, rgba: UInt8[np.ndarray, "S S 4"], window: Window) -> None:
+    """Lay a crop over the frame, in place, where its window lies."""
+    if rgba.shape[0] != window.side:
+        kind = cv2.INTER_AREA if rgba.shape[0] > window.side else cv2.INTER_CUBIC
+        rgba = cv2.resize(rgba, (window.side, window.side), interpolation=kind)
+    rows, columns, own_rows, own_columns = window.visible(*frame.shape[:2])
+    over = rgba[own_rows, own_columns]
+    target = frame[rows, columns]
+    coverage = np.ascontiguousarray(over[..., 3])
+    colour = cv2.cvtColor(over, cv2.COLOR_RGBA2RGB)
+    edge = np.nonzero(cv2.inRange(coverage, 1, 254))
+    weight = coverage[edge][:, None].astype(np.uint16)
+    blend = (colour[edge] * weight + target[edge] * (255 - weight) + 127) // 255
+    cv2.copyTo(colour, cv2.inRange(coverage, 255, 255), target)
+    target[edge] = blend.astype(np.uint8)
+
+
+def colour_iuv(iuv: UInt8[np.ndarray, "H W 3"]) -> Frame:
+    """An IUV image as DensePose shows it: the part as a hue, U and V as its shades."""
+    part = cv2.applyColorMap(
+        np.ascontiguousarray(iuv[..., 0]) * np.uint8(PART_COLOUR_STEP), cv2.COLORMAP_PARULA
+    )
+    shade = (iuv[..., 1:].astype(np.float32).mean(-1) / 255)[..., None] * 0.5 + 0.5
+    return np.where(iuv[..., :1] > 0, part[..., ::-1] * shade, 255).astype(np.uint8)
+
+
+class Comparison:
+    """Source, target IUV and result side by side, all as high as the result."""
+
+    def __init__(self, source: Source, height: int, width: int) -> None:
+        photo = source.photo.rgb
+        photo_width = max(2, round(photo.shape[1] * height / photo.shape[0] / 2) * 2)
+        kind = cv2.INTER_AREA if height < photo.shape[0] else cv2.INTER_CUBIC
+        self._blank = np.full((height, photo_width + 2 * width, 3), 255, np.uint8)
+        self._blank[:, :photo_width] = cv2.resize(photo, (photo_width, height), interpolation=kind)
+        self._panels = (photo_width, photo_width + width)
+        self.size = (height, photo_width + 2 * width)
+
+    def frame(self, iuv: UInt8[np.ndarray, "H W 3"], result: Frame) -> Frame:
+        """One output frame; the result may be a pixel larger than the IUV."""
+        picture = self._blank.copy()
+        for left, panel in zip(self._panels, (colour_iuv(iuv), result), strict=True):
+            picture[: panel.shape[0], left : left + panel.shape[1]] = panel
+        return picture

@@ -1,0 +1,135 @@
+"""Before any frame is rendered: who is followed, where the window lies, how the frames are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from fractions import Fraction
+
+from motion_transfer.errors import InputError
+from motion_transfer.media.iuv_stream import IuvReader
+from motion_transfer.render.person import People, Person, choose_person, find_people, follow
+from motion_transfer.render.window import Window, plan_window
+
+CHUNK_FRAMES = 48
+"""Cut points are multiples of this, whatever the number of workers: they decide the bytes."""
+
+SCAN_FRAMES = 16
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A half-open range of output frames, encoded as one segment."""
+
+    index: int
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """Who is rendered in one frame: nobody (None), or a person, alone in it or to be isolated."""
+
+    person: Person | None
+    alone: bool
+
+
+@dataclass(frozen=True)
+class DriverPlan:
+    """What the engine needs to know of a driver.
+
+    Attributes:
+        first: the driver's frame that becomes output frame 0.
+        frames: one entry for each output frame.
+        window: the crop window, steady for all of them.
+    """
+
+    first: int
+    frames: tuple[FramePlan, ...]
+    window: Window
+    frame_rate: Fraction
+
+    @property
+    def chunks(self) -> list[Chunk]:
+        starts = range(0, len(self.frames), CHUNK_FRAMES)
+        return [
+            Chunk(index, start, min(start + CHUNK_FRAMES, len(self.frames)))
+            for index, start in enumerate(starts)
+        ]
+
+
+def frame_range(frames: tuple[int | None, int | None], count: int, where: str) -> range:
+    """The driver's frames that a run uses. Raises: InputError if it has none of them."""
+    start, stop = frames[0] or 0, count if frames[1] is None else frames[1]
+    if start >= count or stop > count or start >= stop:
+        raise InputError(
+            f"frames {start}:{stop} asked for, but {where} has {count}: 0:{count} at most"
+        )
+    return range(start, stop)
+
+
+def scan_people(
+    reader: IuvReader, frames: range, workers: int, done: Callable[[int], None]
+) -> list[People]:
+    """Everybody in each frame, decoded in parallel; nothing but boxes is kept."""
+
+    def scan(start: int) -> list[People]:
+        block = range(start, min(start + SCAN_FRAMES, frames.stop))
+        found = [find_people(iuv) for iuv in reader.read(block.start, block.stop)]
+        done(len(found))
+        return found
+
+    starts = range(frames.start, frames.stop, SCAN_FRAMES)
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            return [people for block in pool.map(scan, starts) for people in block]
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def plan_driver(
+    reader: IuvReader,
+    *,
+    frames: tuple[int | None, int | None],
+    frame_rate: Fraction,
+    person: str,
+    workers: int,
+    done: Callable[[int], None],
+) -> DriverPlan:
+    """Follow the chosen person through the driver and lay the window around the whole path.
+
+    Raises: InputError if the first frame, or every frame, is empty; IuvFileError on a bad frame.
+    """
+    path_name = str(reader.stream.path)
+    chosen = frame_range(frames, reader.stream.frame_count, path_name)
+    people = scan_people(reader, chosen, workers, done)
+    inhabited = next((i for i, found in enumerate(people) if found.persons), None)
+    if inhabited is None:
+        raise InputError(
+            f"{path_name}: no person in any of the frames {chosen.start}:{chosen.stop}"
+        )
+    if inhabited > 0:
+        raise InputError(
+            f"{reader.stream.where(chosen.start)}: no person in the first frame; start with"
+            f" --frames {chosen.start + inhabited}:{chosen.stop}"
+        )
+    first = choose_person(people[0], person, reader.stream.where(chosen.start))
+    path = follow(people, first)
+    plans = tuple(
+        FramePlan(who, alone=who is not None and len(who.regions) == found.region_count)
+        for who, found in zip(path, people, strict=True)
+    )
+    return DriverPlan(chosen.start, plans, plan_window(path), frame_rate)
+
+
+def empty_stretches(plan: DriverPlan) -> Iterator[tuple[int, int]]:
+    """Half-open ranges of driver frames in which the person cannot be seen."""
+    start = None
+    for index, frame in enumerate((*plan.frames, FramePlan(plan.frames[0].person, True))):
+        if frame.person is None and start is None:
+            start = index
+        elif frame.person is not None and start is not None:
+            yield plan.first + start, plan.first + index
+            start = None

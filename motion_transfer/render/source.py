@@ -1,0 +1,194 @@
+"""The source, once per run: photo and IUV become a partial texture, garments included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+
+from motion_transfer.errors import InputError
+from motion_transfer.media.image import Photo, read_photo
+from motion_transfer.media.iuv_image import ChannelOrder, decide_order, read_raw_iuv, to_iuv
+from motion_transfer.render.options import Garment, RenderOptions
+from motion_transfer.render.person import choose_person, find_people, isolate
+from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
+from nhrr_core.iuv import PART_COUNT, PART_NAMES
+
+SMALLEST_VISIBLE_SHARE = 0.01  # of the texels; a frontal half-length portrait shows about 0.2
+BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
+TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
+GRABCUT_ROUNDS = 3
+GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a renderer needs to know of a source.
+
+    Attributes:
+        photo: the picture, upright.
+        iuv: H x W x 3 uint8, of the chosen person only.
+        texture: 1 x 3 x T x T in [-1, 1], 0 where nothing is seen.
+        visibility: 1 x 1 x T x T, 1 where the texture is seen.
+    """
+
+    photo: Photo
+    iuv: UInt8[np.ndarray, "H W 3"]
+    iuv_path: Path
+    texture: Float[Tensor, "1 3 T T"]
+    visibility: Float[Tensor, "1 1 T T"]
+
+
+def prepare_source(options: RenderOptions, texture_size: int) -> Source:
+    """Read the source (and garments) and unfold what they show.
+
+    Raises: InputError if a file is missing or unfit, sizes differ, nobody or too little is seen,
+        or a garment photo shows none of its parts.
+    """
+    photo = read_photo(options.source)
+    iuv_path = options.source_iuv or find_iuv_beside(options.source)
+    iuv = _read_person(photo, iuv_path, options.person, options.source_iuv_order, "source")
+    taken = {part for garment in options.garments for part in garment.parts}
+    kept = tuple(part for part in range(1, PART_COUNT + 1) if part not in taken)
+    layers = [unfold(photo, iuv, kept, texture_size)]
+    for number, garment in enumerate(options.garments):
+        later = {part for other in options.garments[number + 1 :] for part in other.parts}
+        layers.append(_unfold_garment(garment, later, options, texture_size))
+    texture, visibility = merge_textures(layers)
+    share = float(visibility.mean())
+    if share < SMALLEST_VISIBLE_SHARE:
+        raise InputError(
+            f"source {options.source} shows too little of the body ({share:.1%} of the texture);"
+            " use a larger photo, or choose another --person"
+        )
+    return Source(photo, iuv, iuv_path, texture, visibility)
+
+
+def find_iuv_beside(photo: Path) -> Path:
+    """`<stem>_IUV.png` or `<stem>_iuv.png` next to a photo. Raises: InputError if neither is."""
+    if not photo.exists():
+        raise InputError(f"source {photo} does not exist")
+    candidates = [photo.with_name(f"{photo.stem}_{word}.png") for word in ("IUV", "iuv")]
+    for candidate in candidates:
+        if candidate.exists():
+            return candidate
+    raise InputError(
+        f"no IUV found for {photo}: neither {candidates[0].name} nor {candidates[1].name} is beside"
+        " it; make one with DensePose and name it with --source-iuv"
+    )
+
+
+def unfold(
+    photo: Photo, iuv: UInt8[np.ndarray, "H W 3"], parts: tuple[int, ...], texture_size: int
+) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
+    """Partial texture in [-1, 1] and visibility of some parts of a photo at its full resolution."""
+    rows, columns = (np.flatnonzero(iuv[..., 0].any(axis)) for axis in (1, 0))
+    if not len(rows):
+        blank = torch.zeros(1, 1, texture_size, texture_size)
+        return blank.expand(-1, 3, -1, -1), blank
+    margin = round((rows[-1] - rows[0]) * 2 * BAND_SHARE)
+    body = np.s_[
+        max(0, rows[0] - margin) : rows[-1] + 1 + margin,
+        max(0, columns[0] - margin) : columns[-1] + 1 + margin,
+    ]
+    rgb, own = np.ascontiguousarray(photo.rgb[body]), np.ascontiguousarray(iuv[body])
+    tensors = [
+        torch.from_numpy(image).permute(2, 0, 1)[None] for image in (rgb, trim_outline(rgb, own))
+    ]
+    colours, body_iuv = tensors[0].float() / 127.5 - 1, keep_parts(tensors[1], parts)
+    return extract_texture(colours, body_iuv, load_uv_layout().charts, texture_size)
+
+
+def trim_outline(
+    rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """The IUV without the background that strays into its outline.
+
+    Only a band along the outline is doubted. In it, GrabCut (Rother et al., SIGGRAPH 2004) decides
+    by colour, and the outermost pixels, where photo and outline mix, always go.
+    """
+    mask = cv2.min(np.ascontiguousarray(iuv[..., 0]), 1)
+    rows = np.flatnonzero(mask.any(1))
+    if not len(rows):
+        return iuv
+    height = int(rows[-1] - rows[0] + 1)
+    scale = min(1, GRABCUT_HEIGHT / height)
+    small = max(1, round(mask.shape[1] * scale)), max(1, round(mask.shape[0] * scale))
+    labels = _cut_out(
+        cv2.resize(rgb, small, interpolation=cv2.INTER_AREA),
+        cv2.resize(mask, small, interpolation=cv2.INTER_NEAREST),
+        height * scale,
+    )
+    person = mask & cv2.resize(labels, mask.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    return iuv * cv2.erode(person, _disc(height * TRIM_SHARE))[..., None]
+
+
+def _cut_out(
+    rgb: UInt8[np.ndarray, "H W 3"], mask: UInt8[np.ndarray, "H W"], height: float
+) -> UInt8[np.ndarray, "H W"]:
+    """1 where a person of that height in px is, by colour along the outline of a rough mask."""
+    inner = cv2.erode(mask, _disc(height * BAND_SHARE))
+    outer = cv2.dilate(mask, _disc(height * BAND_SHARE))
+    if not inner.any() or outer.all():
+        return mask
+    labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[inner > 0], labels[outer == 0] = cv2.GC_FGD, cv2.GC_BGD
+    cv2.setRNGSeed(0)  # GrabCut starts from k-means
+    models = np.zeros((1, 65)), np.zeros((1, 65))
+    cv2.grabCut(rgb, labels, None, *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
+    return labels & 1  # the odd labels, GC_FGD and GC_PR_FGD, are the person
+
+
+def _disc(radius: float) -> np.ndarray:
+    side = 2 * max(1, round(radius)) + 1
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+
+
+def _unfold_garment(
+    garment: Garment, later: set[int], options: RenderOptions, texture_size: int
+) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
+    photo = read_photo(garment.photo, "garment")
+    path = garment.iuv or find_iuv_beside(garment.photo)
+    iuv = _read_person(photo, path, "largest", options.source_iuv_order, "garment")
+    parts = tuple(part for part in garment.parts if part not in later)
+    texture, visibility = unfold(photo, iuv, parts, texture_size)
+    if parts and not visibility.any():
+        shown = ", ".join(PART_NAMES[part] for part in np.unique(iuv[..., 0]) if part)
+        raise InputError(
+            f"garment {garment.photo} shows none of {', '.join(PART_NAMES[p] for p in parts)};"
+            f" it shows {shown}"
+        )
+    return texture, visibility
+
+
+def _read_person(
+    photo: Photo, path: Path, choice: str, order: ChannelOrder | None, what: str
+) -> UInt8[np.ndarray, "H W 3"]:
+    """The IUV of one person in a photo, without pixels that the photo's alpha leaves out."""
+    where = f"{what} IUV {path}"
+    raw = read_raw_iuv(path, f"{what} IUV")
+    if raw.shape[:2] != photo.rgb.shape[:2]:
+        height, width = photo.rgb.shape[:2]
+        hint = "make the IUV from this very photo"
+        if photo.turned and raw.shape[1::-1] == (height, width):
+            hint = "the photo was turned upright as its EXIF says, make the IUV from it like that"
+        raise InputError(
+            f"{where} is {raw.shape[1]} x {raw.shape[0]}, but {photo.path} is {width} x {height};"
+            f" {hint}"
+        )
+    order = order or decide_order([(where, raw)], where)
+    if order is None:
+        raise InputError(f"{where}: no person in it, every pixel is background")
+    iuv = to_iuv(raw, order, where)
+    people = find_people(iuv)
+    person = choose_person(people, choice, where)
+    if len(person.regions) != people.region_count:
+        iuv = isolate(iuv, person)
+    if photo.alpha is not None:
+        iuv = iuv * (photo.alpha >= 128)[..., None]
+    return iuv

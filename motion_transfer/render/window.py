@@ -1,0 +1,56 @@
+"""The crop window: one square around the person, steady for the whole driver."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from motion_transfer.render.person import Person
+
+MARGIN = 0.08  # of the person's longer side, on each side: room for hair and clothes
+
+
+@dataclass(frozen=True)
+class Window:
+    """A square in a frame, px; it may reach beyond the frame's edges."""
+
+    x: int
+    y: int
+    side: int
+
+    def visible(self, height: int, width: int) -> tuple[slice, slice, slice, slice]:
+        """Rows and columns of the frame that lie in the window, then those of the window."""
+        top, left = max(self.y, 0), max(self.x, 0)
+        bottom, right = min(self.y + self.side, height), min(self.x + self.side, width)
+        return (
+            slice(top, bottom),
+            slice(left, right),
+            slice(top - self.y, bottom - self.y),
+            slice(left - self.x, right - self.x),
+        )
+
+    def cut(self, iuv: UInt8[np.ndarray, "H W 3"], size: int) -> UInt8[np.ndarray, "S S 3"]:
+        """The window's content at size x size; nearest pixel, as parts cannot be averaged."""
+        rows, columns, own_rows, own_columns = self.visible(*iuv.shape[:2])
+        if (rows.stop - rows.start, columns.stop - columns.start) == (self.side, self.side):
+            square = iuv[rows, columns]
+        else:
+            square = np.zeros((self.side, self.side, 3), np.uint8)
+            square[own_rows, own_columns] = iuv[rows, columns]
+        if size == self.side:
+            return square
+        return cv2.resize(square, (size, size), interpolation=cv2.INTER_NEAREST_EXACT)
+
+
+def plan_window(path: Iterable[Person | None]) -> Window:
+    """The smallest even-sided square, with a margin, that holds the person in every frame."""
+    persons = [person for person in path if person is not None]
+    x0, y0 = min(p.x0 for p in persons), min(p.y0 for p in persons)
+    x1, y1 = max(p.x1 for p in persons), max(p.y1 for p in persons)
+    side = round(max(x1 - x0, y1 - y0) * (1 + 2 * MARGIN) / 2) * 2
+    side = max(side, 16)
+    return Window(x=(x0 + x1 - side) // 2, y=(y0 + y1 - side) // 2, side=side)

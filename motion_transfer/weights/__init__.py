@@ -1,0 +1,10 @@
+"""Find, check and load checkpoints."""
+
+from motion_transfer.weights.checkpoint import (
+    CheckpointInfo,
+    inspect_checkpoint,
+    load_checkpoint,
+    save_checkpoint,
+)
+
+__all__ = ["CheckpointInfo", "inspect_checkpoint", "load_checkpoint", "save_checkpoint"]

@@ -1,0 +1,46 @@
+"""Neural Re-Rendering of Humans from a Single Image (Sarkar et al., ECCV 2020), in pure torch.
+
+Tensors in, tensors out: no files, no devices chosen, nothing printed.
+"""
+
+from nhrr_core.config import PRESETS, VARIANTS, ModelConfig
+from nhrr_core.errors import ConfigError, IuvError, NhrrError, ShapeError
+from nhrr_core.feature_net import FeatureNet
+from nhrr_core.iuv import (
+    PART_COUNT,
+    PART_GROUPS,
+    PART_NAMES,
+    check_iuv,
+    keep_parts,
+    normalise_iuv,
+)
+from nhrr_core.model import NeuralReRenderer
+from nhrr_core.render_net import RenderNet
+from nhrr_core.sampling import sample_features
+from nhrr_core.texture import extract_texture, merge_textures
+from nhrr_core.uv_layout import UVLayout, load_uv_layout, texture_coordinates
+
+__all__ = [
+    "PART_COUNT",
+    "PART_GROUPS",
+    "PART_NAMES",
+    "PRESETS",
+    "VARIANTS",
+    "ConfigError",
+    "FeatureNet",
+    "IuvError",
+    "ModelConfig",
+    "NeuralReRenderer",
+    "NhrrError",
+    "RenderNet",
+    "ShapeError",
+    "UVLayout",
+    "check_iuv",
+    "extract_texture",
+    "keep_parts",
+    "load_uv_layout",
+    "merge_textures",
+    "normalise_iuv",
+    "sample_features",
+    "texture_coordinates",
+]

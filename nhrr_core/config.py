@@ -1,0 +1,118 @@
+"""The networks' sizes and the paper's variants, as one frozen value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Literal, get_args
+
+from nhrr_core.errors import ConfigError
+
+Variant = Literal["full", "no-int", "ip", "warp", "warp-cond"]
+VARIANTS: tuple[str, ...] = get_args(Variant)
+
+COLOUR_CHANNELS = 3
+IUV_CHANNELS = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelConfig:
+    """Everything that decides the shape of the networks, and nothing else.
+
+    Source: the paper, Sec. 3; widths from Pix2PixHD's global generator (RenderNet) and U-Net
+    (FeatureNet). Departs from it: `visibility_input` (on) gives FeatureNet the visibility as a
+    fourth channel, because an unseen texel and a mid-grey one are otherwise the same input.
+
+    Attributes:
+        variant: `full`; `no-int` (same networks, trained without the texture loss); `ip` (the map
+            is an inpainted RGB texture); `warp` (the partial texture itself); `warp-cond` (that
+            and the target IUV).
+        feature_channels: d, channels of the feature map for `full` and `no-int`.
+        feature_width: channels of FeatureNet's first block; they double down to 8 times that.
+        render_width: channels of RenderNet's first convolution; they double at each down block.
+        down_blocks, residual_blocks: of RenderNet.
+        texture_size: side of the UV texture in texels, a multiple of 16.
+        image_size: side of the image RenderNet works on in pixels, a multiple of 2**down_blocks.
+        alpha: RenderNet has a fourth output, the person's coverage.
+        visibility_input: see above.
+    """
+
+    variant: Variant = "full"
+    feature_channels: int = 16
+    feature_width: int = 64
+    render_width: int = 64
+    down_blocks: int = 3
+    residual_blocks: int = 6
+    texture_size: int = 256
+    image_size: int = 256
+    alpha: bool = False
+    visibility_input: bool = True
+
+    def __post_init__(self) -> None:
+        if self.variant not in VARIANTS:
+            raise ConfigError(f"variant is {self.variant!r}; supported are {', '.join(VARIANTS)}")
+        for name in ("alpha", "visibility_input"):
+            if not isinstance(getattr(self, name), bool):
+                raise ConfigError(f"{name} is {getattr(self, name)!r}; it must be true or false")
+        for name, low, high, multiple in (
+            ("feature_channels", COLOUR_CHANNELS, 1024, 1),
+            ("feature_width", 1, 1024, 1),
+            ("render_width", 1, 1024, 1),
+            ("down_blocks", 1, 6, 1),
+            ("residual_blocks", 1, 64, 1),
+            ("texture_size", 16, 4096, 16),
+            ("image_size", 16, 4096, 2**self.down_blocks),
+        ):
+            value = getattr(self, name)
+            if type(value) is not int or not low <= value <= high or value % multiple:
+                rule = f"an integer from {low} to {high}"
+                rule += f", a multiple of {multiple}" if multiple > 1 else ""
+                raise ConfigError(f"{name} is {value!r}; it must be {rule}")
+
+    @classmethod
+    def preset(cls, name: str, **changes: Any) -> ModelConfig:
+        """`paper` (31.5 M RenderNet parameters, 80.3 GFLOP a 256 x 256 frame) or `lite` (7.9 M, 22.0).
+
+        Raises: ConfigError on an unknown name.
+        """
+        if name not in PRESETS:
+            raise ConfigError(f"preset is {name!r}; supported are {', '.join(PRESETS)}")
+        return replace(PRESETS[name], **changes)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> ModelConfig:
+        """The inverse of `to_dict`. Raises: ConfigError on unknown fields or impossible values."""
+        unknown = sorted(set(values) - {field.name for field in fields(cls)})
+        if unknown:
+            raise ConfigError(f"unknown configuration field {', '.join(unknown)}")
+        return cls(**values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON or TOML."""
+        return asdict(self)
+
+    @property
+    def has_feature_net(self) -> bool:
+        """Whether a network completes the partial texture (all variants but the warps)."""
+        return self.variant in ("full", "no-int", "ip")
+
+    @property
+    def map_channels(self) -> int:
+        """Channels of the feature map: d, or 3 where the map is a colour texture."""
+        return self.feature_channels if self.variant in ("full", "no-int") else COLOUR_CHANNELS
+
+    @property
+    def render_inputs(self) -> int:
+        """Channels that RenderNet reads: the feature image, and the target IUV for `warp-cond`."""
+        return self.map_channels + (IUV_CHANNELS if self.variant == "warp-cond" else 0)
+
+    @property
+    def render_outputs(self) -> int:
+        """Channels that RenderNet writes: RGB, and alpha where the configuration has it."""
+        return COLOUR_CHANNELS + int(self.alpha)
+
+
+PRESETS = {
+    "paper": ModelConfig(),
+    "lite": ModelConfig(feature_width=32, render_width=32),
+}

@@ -1,0 +1,54 @@
+"""FeatureNet f: a U-Net that completes a partial texture to a full UV feature map."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float
+from torch import Tensor, nn
+
+DOWN_BLOCKS = 4
+
+
+def _two_convolutions(inputs: int, outputs: int) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for channels in (inputs, outputs):
+        layers += [
+            nn.Conv2d(channels, outputs, 3, padding=1, bias=False),
+            nn.BatchNorm2d(outputs),
+            nn.ReLU(inplace=True),
+        ]
+    return nn.Sequential(*layers)
+
+
+class FeatureNet(nn.Module):
+    """Four down blocks (max-pool, two convolutions), four up blocks (bilinear, skip, likewise).
+
+    A 256 x 256 texture reaches 16 x 16 in the middle.
+    Source: the paper, Sec. 3.2. Departs from it: no; widths and batch normalisation, which it does
+    not give, are the usual U-Net's.
+    """
+
+    def __init__(self, *, inputs: int, outputs: int, width: int) -> None:
+        super().__init__()
+        widths = [width, width * 2, width * 4, width * 8, width * 8]
+        self.entry = _two_convolutions(inputs, widths[0])
+        self.down = nn.ModuleList(
+            _two_convolutions(widths[i], widths[i + 1]) for i in range(DOWN_BLOCKS)
+        )
+        self.up = nn.ModuleList(
+            _two_convolutions(widths[i + 1] + widths[i], widths[max(i - 1, 0)])
+            for i in reversed(range(DOWN_BLOCKS))
+        )
+        self.exit = nn.Conv2d(widths[0], outputs, 1)
+
+    def forward(self, texture: Float[Tensor, "B C T T"]) -> Float[Tensor, "B D T T"]:
+        """The feature map of a texture (with or without its visibility); T a multiple of 16."""
+        skips = [self.entry(texture)]
+        for block in self.down:
+            skips.append(block(F.max_pool2d(skips[-1], 2)))
+        x = skips.pop()
+        for block in self.up:
+            x = F.interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=False)
+            x = block(torch.cat([x, skips.pop()], dim=1))
+        return self.exit(x)

@@ -1,0 +1,86 @@
+"""DensePose's parts and the IUV convention.
+
+Convention: an IUV image is uint8, channels (I, U, V). I in 0..24 is the part, 0 the background.
+U and V are chart coordinates in [0, 1], scaled by 255. Left and right are the person's own.
+Source: DensePose (Güler et al., CVPR 2018).
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+
+from nhrr_core.errors import IuvError, ShapeError
+
+PART_COUNT = 24
+
+PART_NAMES: tuple[str, ...] = (
+    "background",
+    "torso-back",
+    "torso-front",
+    "hand-right",
+    "hand-left",
+    "foot-left",
+    "foot-right",
+    "upper-leg-right-back",
+    "upper-leg-left-back",
+    "upper-leg-right-front",
+    "upper-leg-left-front",
+    "lower-leg-right-back",
+    "lower-leg-left-back",
+    "lower-leg-right-front",
+    "lower-leg-left-front",
+    "upper-arm-left-front",
+    "upper-arm-right-front",
+    "upper-arm-left-back",
+    "upper-arm-right-back",
+    "lower-arm-left-inner",
+    "lower-arm-right-inner",
+    "lower-arm-left-outer",
+    "lower-arm-right-outer",
+    "head-right",
+    "head-left",
+)
+"""`PART_NAMES[i]` is the name of part i."""
+
+PART_GROUPS: dict[str, tuple[int, ...]] = {
+    "torso": (1, 2),
+    "hands": (3, 4),
+    "feet": (5, 6),
+    "upper-legs": (7, 8, 9, 10),
+    "lower-legs": (11, 12, 13, 14),
+    "upper-arms": (15, 16, 17, 18),
+    "lower-arms": (19, 20, 21, 22),
+    "head": (23, 24),
+}
+"""The words people use for garments, each for both sides and both faces of the limb."""
+
+
+def check_iuv(iuv: Tensor) -> None:
+    """Hold a tensor to the convention.
+
+    Raises:
+        ShapeError: unless it is B x 3 x H x W.
+        IuvError: unless it is uint8 with every part index at most 24.
+    """
+    if iuv.ndim != 4 or iuv.shape[1] != 3:
+        raise ShapeError(f"an IUV tensor is B x 3 x H x W, not {list(iuv.shape)}")
+    if iuv.dtype != torch.uint8:
+        raise IuvError(f"an IUV tensor is uint8, not {iuv.dtype}")
+    highest = int(iuv[:, 0].max()) if iuv.numel() else 0
+    if highest > PART_COUNT:
+        raise IuvError(f"part index {highest} found; parts are 1 to {PART_COUNT}, 0 is background")
+
+
+def keep_parts(iuv: UInt8[Tensor, "B 3 H W"], parts: tuple[int, ...]) -> UInt8[Tensor, "B 3 H W"]:
+    """The IUV with every pixel of another part turned into background (0, 0, 0)."""
+    allowed = torch.zeros(256, dtype=torch.uint8, device=iuv.device)
+    allowed[list(parts)] = 1
+    return iuv * allowed[iuv[:, :1].long()]
+
+
+def normalise_iuv(iuv: UInt8[Tensor, "B 3 H W"]) -> Float[Tensor, "B 3 H W"]:
+    """IUV as network input: I / 24, U / 255 and V / 255, each brought to [-1, 1]."""
+    scale = torch.tensor([2 / PART_COUNT, 2 / 255, 2 / 255], device=iuv.device)
+    return iuv * scale[:, None, None] - 1

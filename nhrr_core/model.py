@@ -1,0 +1,108 @@
+"""The whole method: encode a source once, render it in any pose."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor, nn
+
+from nhrr_core.config import ModelConfig
+from nhrr_core.errors import ShapeError
+from nhrr_core.feature_net import FeatureNet
+from nhrr_core.iuv import normalise_iuv
+from nhrr_core.render_net import RenderNet
+from nhrr_core.sampling import sample_features
+from nhrr_core.texture import extract_texture
+from nhrr_core.uv_layout import load_uv_layout
+
+
+class NeuralReRenderer(nn.Module):
+    """g(r(f(T_s), P_t)): FeatureNet, sampler and RenderNet of one variant.
+
+    Convention: photos are RGB in [-1, 1], IUV is uint8 (I, U, V), frames are RGB in [-1, 1]; with
+    `config.alpha` a fourth channel holds the coverage, likewise in [-1, 1].
+    Source: the paper, Sec. 3, Eq. 4.
+
+    Example:
+        >>> model = NeuralReRenderer(ModelConfig.preset("lite")).eval()
+        >>> feature_map = model.encode(photo, photo_iuv)      # once per source
+        >>> frames = model.render(feature_map, target_iuv)    # any number of target poses
+    """
+
+    charts: Tensor
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.feature_net = (
+            FeatureNet(
+                inputs=3 + int(config.visibility_input),
+                outputs=config.map_channels,
+                width=config.feature_width,
+            )
+            if config.has_feature_net
+            else None
+        )
+        self.render_net = RenderNet(
+            inputs=config.render_inputs,
+            outputs=config.render_outputs,
+            width=config.render_width,
+            down_blocks=config.down_blocks,
+            residual_blocks=config.residual_blocks,
+        )
+        self.register_buffer("charts", load_uv_layout().charts.clone(), persistent=False)
+
+    def encode(
+        self, photo: Float[Tensor, "B 3 H W"], iuv: UInt8[Tensor, "B 3 H W"]
+    ) -> Float[Tensor, "B D T T"]:
+        """The UV feature map F_s of a photo of any size. Raises: ShapeError, IuvError."""
+        return self.encode_texture(
+            *extract_texture(photo, iuv, self.charts, self.config.texture_size)
+        )
+
+    def encode_texture(
+        self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
+    ) -> Float[Tensor, "B D T T"]:
+        """The UV feature map of a partial texture; for the warp variants, that texture itself.
+
+        Raises: ShapeError if its side is not a multiple of 16.
+        """
+        if self.feature_net is None:
+            return texture
+        if texture.shape[-1] % 16 or texture.shape[-2] % 16:
+            raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
+        if self.config.visibility_input:
+            texture = torch.cat([texture, visibility], dim=1)
+        return self.feature_net(texture)
+
+    def feature_image(
+        self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
+    ) -> Float[Tensor, "B C H W"]:
+        """What RenderNet sees: the sampled map, and the target IUV for `warp-cond`."""
+        features = sample_features(feature_map, target_iuv, self.charts)
+        if self.config.variant == "warp-cond":
+            return torch.cat([features, normalise_iuv(target_iuv)], dim=1)
+        return features
+
+    def render(
+        self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
+    ) -> Float[Tensor, "B K H W"]:
+        """Frames of the source in the target poses, one feature map for all or one for each.
+
+        Raises: ShapeError if H or W is not a multiple of 2**down_blocks.
+        """
+        multiple = 2**self.config.down_blocks
+        if target_iuv.shape[-1] % multiple or target_iuv.shape[-2] % multiple:
+            raise ShapeError(
+                f"target IUV {list(target_iuv.shape)}: its sides must be multiples of {multiple}"
+            )
+        return self.render_net(self.feature_image(feature_map, target_iuv))
+
+    def forward(
+        self,
+        photo: Float[Tensor, "B 3 H W"],
+        photo_iuv: UInt8[Tensor, "B 3 H W"],
+        target_iuv: UInt8[Tensor, "B 3 Ht Wt"],
+    ) -> Float[Tensor, "B K Ht Wt"]:
+        """Encode and render in one go, as in training."""
+        return self.render(self.encode(photo, photo_iuv), target_iuv)

@@ -1,0 +1,56 @@
+"""RenderNet g: a feature image becomes a frame."""
+
+from __future__ import annotations
+
+from jaxtyping import Float
+from torch import Tensor, nn
+
+
+class ResidualBlock(nn.Module):
+    """x + (3x3, norm, ReLU, 3x3, norm), reflected at the border."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.body = nn.Sequential(
+            nn.ReflectionPad2d(1),
+            nn.Conv2d(channels, channels, 3),
+            nn.InstanceNorm2d(channels),
+            nn.ReLU(inplace=True),
+            nn.ReflectionPad2d(1),
+            nn.Conv2d(channels, channels, 3),
+            nn.InstanceNorm2d(channels),
+        )
+
+    def forward(self, x: Float[Tensor, "B C H W"]) -> Float[Tensor, "B C H W"]:
+        return x + self.body(x)
+
+
+class RenderNet(nn.Module):
+    """Pix2PixHD's global generator: 7x7, down blocks, residual blocks, up blocks, 7x7, tanh.
+
+    Source: the paper, Sec. 3.4; layer shapes from Pix2PixHD (Wang et al., CVPR 2018).
+    """
+
+    def __init__(
+        self, *, inputs: int, outputs: int, width: int, down_blocks: int, residual_blocks: int
+    ) -> None:
+        super().__init__()
+        layers: list[nn.Module] = [nn.ReflectionPad2d(3), nn.Conv2d(inputs, width, 7)]
+        layers += [nn.InstanceNorm2d(width), nn.ReLU(inplace=True)]
+        for i in range(down_blocks):
+            wide = width * 2 ** (i + 1)
+            layers += [nn.Conv2d(wide // 2, wide, 3, stride=2, padding=1)]
+            layers += [nn.InstanceNorm2d(wide), nn.ReLU(inplace=True)]
+        layers += [ResidualBlock(width * 2**down_blocks) for _ in range(residual_blocks)]
+        for i in reversed(range(down_blocks)):
+            narrow = width * 2**i
+            layers += [
+                nn.ConvTranspose2d(narrow * 2, narrow, 3, stride=2, padding=1, output_padding=1)
+            ]
+            layers += [nn.InstanceNorm2d(narrow), nn.ReLU(inplace=True)]
+        layers += [nn.ReflectionPad2d(3), nn.Conv2d(width, outputs, 7), nn.Tanh()]
+        self.layers = nn.Sequential(*layers)
+
+    def forward(self, features: Float[Tensor, "B C H W"]) -> Float[Tensor, "B K H W"]:
+        """A frame in [-1, 1]; H and W multiples of 2**down_blocks."""
+        return self.layers(features)

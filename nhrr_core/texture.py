@@ -1,0 +1,148 @@
+"""UV space from screen space: the partial texture of what a photo shows."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float, Int64, UInt8
+from torch import Tensor
+
+from nhrr_core.errors import ShapeError
+from nhrr_core.iuv import check_iuv
+from nhrr_core.uv_layout import chart_index, texture_coordinates
+
+MAX_CHART_STEP = 0.15
+"""Neighbouring pixels whose U or V differ by more lie on separate pieces of the surface."""
+
+MAX_STRETCH_TEXELS = 16
+"""So do neighbours that land further apart in the texture."""
+
+SAMPLES_PER_TEXEL = 1.5
+"""Spacing of the points that fill between pixels; above sqrt(2), so that no texel is missed."""
+
+
+def extract_texture(
+    image: Float[Tensor, "B C H W"],
+    iuv: UInt8[Tensor, "B 3 H W"],
+    charts: Float[Tensor, "24 256 256 2"],
+    size: int,
+) -> tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]:
+    """Unfold the visible pixels of a photo into a partial UV texture, and say which texels are seen.
+
+    A texel is the mean of all pixels that land in it. Where the photo is coarser than the texture,
+    the texels between the centres of four neighbouring pixels of one part are interpolated
+    bilinearly from those; nothing is filled outside such a quad.
+
+    Convention: image and IUV have the same size in pixels, whatever it is; values pass unchanged.
+    Returns: texture, 0 where unseen, and visibility, 1 where seen and 0 elsewhere. Both
+        differentiable with respect to the image.
+    Raises: ShapeError, IuvError.
+    Source: the paper, Sec. 3.1; the filling between pixels is this project's.
+    """
+    check_iuv(iuv)
+    if image.shape[0] != iuv.shape[0] or image.shape[2:] != iuv.shape[2:]:
+        raise ShapeError(f"photo {list(image.shape)} and IUV {list(iuv.shape)} do not match")
+    if size < 1:
+        raise ShapeError(f"texture size is {size}; it must be at least 1")
+    place = texture_coordinates(iuv, charts)
+    colours = image.permute(0, 2, 3, 1)
+    batch = torch.arange(image.shape[0], device=image.device)[:, None, None]
+    texels = image.shape[0] * size * size
+
+    seen = iuv[:, 0] > 0
+    total, count = _scatter(colours[seen], _texel(place, batch, size)[seen], texels)
+    fill_total, fill_count = torch.zeros_like(total), torch.zeros_like(count)
+    for steps, quad, chosen in _quads_by_steps(iuv, place, size):
+        points, texel = _fill_points(colours, iuv, charts, quad, chosen, steps, size)
+        more_total, more_count = _scatter(points, texel, texels)
+        fill_total, fill_count = fill_total + more_total, fill_count + more_count
+
+    hit = count > 0
+    total = torch.where(hit[:, None], total, fill_total)
+    count = torch.where(hit, count, fill_count)
+    texture = total / count.clamp_min(1)[:, None]
+    shape = (image.shape[0], size, size)
+    return (
+        texture.view(*shape, -1).permute(0, 3, 1, 2),
+        (count > 0).to(image.dtype).view(shape)[:, None],
+    )
+
+
+def merge_textures(
+    layers: list[tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]],
+) -> tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]:
+    """The union of partial textures whose occupancies are made to exclude each other.
+
+    Later layers win where two claim a texel.
+    Source: the paper, Sec. 4.5 (garment transfer).
+    """
+    texture, visibility = layers[0]
+    for more_texture, more_visibility in layers[1:]:
+        texture = texture * (1 - more_visibility) + more_texture * more_visibility
+        visibility = torch.maximum(visibility, more_visibility)
+    return texture, visibility
+
+
+def _texel(
+    place: Float[Tensor, "*shape 2"], batch: Int64[Tensor, "..."], size: int
+) -> Int64[Tensor, "*shape"]:
+    """Index of the texel that a place falls in, counted through the batch."""
+    column, row = (place * size).long().clamp(0, size - 1).unbind(-1)
+    return (batch * size + row) * size + column
+
+
+def _scatter(
+    values: Float[Tensor, "N C"], index: Int64[Tensor, " N"], length: int
+) -> tuple[Float[Tensor, "L C"], Float[Tensor, " L"]]:
+    """Sums and counts of the values per index."""
+    total = values.new_zeros(length, values.shape[1]).index_add(0, index, values)
+    count = values.new_zeros(length).index_add(0, index, torch.ones_like(values[:, 0]))
+    return total, count
+
+
+def _corners(x: Tensor) -> Tensor:
+    """The four corners of each 2 x 2 quad of a B x H x W (x C) tensor, stacked in front."""
+    return torch.stack([x[:, :-1, :-1], x[:, :-1, 1:], x[:, 1:, :-1], x[:, 1:, 1:]])
+
+
+def _quads_by_steps(
+    iuv: UInt8[Tensor, "B 3 H W"], place: Float[Tensor, "B H W 2"], size: int
+) -> list[tuple[int, Int64[Tensor, "B Hq Wq"], Bool[Tensor, "B Hq Wq"]]]:
+    """Quads that need filling, grouped by the number of points along a side (a power of two)."""
+    part, u, v = (_corners(channel) for channel in iuv.int().unbind(1))
+    step = torch.maximum(u.amax(0) - u.amin(0), v.amax(0) - v.amin(0))
+    corners = _corners(place)
+    stretch = (corners.amax(0) - corners.amin(0)).amax(-1) * size
+    joined = (part[0] > 0) & (part == part[0]).all(0)
+    joined &= (step <= MAX_CHART_STEP * 255) & (stretch <= MAX_STRETCH_TEXELS)
+    wanted = stretch * SAMPLES_PER_TEXEL
+    quad = torch.arange(part[0].numel(), device=iuv.device).view_as(part[0])
+    groups, low = [], SAMPLES_PER_TEXEL  # at most one texel apart: no texel lies between
+    for steps in (2, 4, 8, 16, 32):
+        chosen = joined & (wanted > low) & (wanted <= steps)
+        low = max(low, steps)
+        if chosen.any():
+            groups.append((steps, quad, chosen))
+    return groups
+
+
+def _fill_points(
+    colours: Float[Tensor, "B H W C"],
+    iuv: UInt8[Tensor, "B 3 H W"],
+    charts: Float[Tensor, "24 256 256 2"],
+    quad: Int64[Tensor, "B Hq Wq"],
+    chosen: Bool[Tensor, "B Hq Wq"],
+    steps: int,
+    size: int,
+) -> tuple[Float[Tensor, "N C"], Int64[Tensor, " N"]]:
+    """Colours and texels of steps x steps points spread evenly inside each chosen quad."""
+    line = (torch.arange(steps, device=iuv.device, dtype=colours.dtype) + 0.5) / steps
+    y, x = (axis.reshape(-1) for axis in torch.meshgrid(line, line, indexing="ij"))
+    weights = torch.stack([(1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x])
+
+    values = torch.einsum("kp,kqc->qpc", weights, _corners(colours)[:, chosen])
+    chart_uv = _corners(iuv[:, 1:].permute(0, 2, 3, 1).to(colours.dtype))[:, chosen]
+    u, v = torch.einsum("kp,kqc->qpc", weights, chart_uv).round().long().unbind(-1)
+    part = iuv[:, 0, :-1, :-1][chosen].long()[:, None].expand_as(u)
+    place = charts.view(-1, 2)[chart_index(part, u, v)]
+    batch = quad[chosen].div(quad[0].numel(), rounding_mode="floor")[:, None]
+    return values.flatten(0, 1), _texel(place, batch, size).flatten()
