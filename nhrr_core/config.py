@@ -71,7 +71,7 @@ class ModelConfig:
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> ModelConfig:
-        """`paper` (31.5 M RenderNet parameters, 80.3 GFLOP a 256 x 256 frame) or `lite` (7.9 M, 22.0).
+        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 22.0).
 
         Raises: ConfigError on an unknown name.
         """

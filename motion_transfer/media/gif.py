@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 import av
+from av.container import OutputContainer
 from av.filter import Graph
+from av.filter.context import FilterContext
 
 GIF_TICK = Fraction(1, 100)  # the format counts time in hundredths of a second
 
@@ -36,24 +39,22 @@ def write_gif(segments: Sequence[Path], destination: Path, rate: Fraction) -> No
         graph.configure()
         colours.push(palette)
         colours.push(None)
-        index = 0
-        for frame in _frames(segments):
+        for index, frame in enumerate(_frames(segments)):
             frame.pts, frame.time_base = index, 1 / rate
             pictures.push(frame)
-            index += 1
-            _drain(sink, stream, output, rate)
+            _drain(sink, stream, output)
         pictures.push(None)
-        _drain(sink, stream, output, rate)
+        _drain(sink, stream, output)
         output.mux(stream.encode(None))
 
 
-def _drain(sink, stream, output, rate: Fraction) -> None:
+def _drain(sink: FilterContext, stream: av.VideoStream, output: OutputContainer) -> None:
     while True:
         try:
-            picture = sink.pull()
-        except (av.error.BlockingIOError, av.error.EOFError):
+            picture = cast(av.VideoFrame, sink.pull())
+        except (BlockingIOError, EOFError):
             return
-        picture.pts = round(picture.pts * picture.time_base / GIF_TICK)
+        picture.pts = round((picture.pts or 0) * (picture.time_base or GIF_TICK) / GIF_TICK)
         picture.time_base = GIF_TICK
         output.mux(stream.encode(picture))
 
@@ -73,7 +74,7 @@ def _find_palette(segments: Sequence[Path], rate: Fraction) -> av.VideoFrame:
         frame.pts, frame.time_base = index, 1 / rate
         source.push(frame)
     source.push(None)
-    return sink.pull()
+    return cast(av.VideoFrame, sink.pull())
 
 
 def _frames(segments: Sequence[Path]) -> Iterator[av.VideoFrame]:

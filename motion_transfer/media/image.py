@@ -54,7 +54,7 @@ def read_photo(path: Path, what: str = "source") -> Photo:
                 grey = np.asarray(image).astype(np.uint32) >> 8
                 image = Image.fromarray(grey.astype(np.uint8))
             transparent = "A" in image.mode or "transparency" in image.info
-            pixels = np.asarray(image.convert("RGBA" if transparent else "RGB"))
+            pixels = np.array(image.convert("RGBA" if transparent else "RGB"))
     except UnidentifiedImageError:
         raise InputError(f"{what} {path} is not a picture in a known format") from None
     except Image.DecompressionBombError as error:

@@ -93,7 +93,7 @@ def to_iuv(raw: Raw, order: ChannelOrder, where: str) -> UInt8[np.ndarray, "H W 
     highest = int(part.max())
     if highest > PART_COUNT:
         raise IuvFileError(
-            f"{where} has part index {highest}; DensePose has parts 1 to {PART_COUNT}, and the other"
+            f"{where} has part index {highest}; DensePose has parts 1 to {PART_COUNT}, and other"
             f" frames say that channel {1 if order == 'iuv' else 3} holds them"
         )
     return raw if order == "iuv" else np.ascontiguousarray(raw[..., ::-1])

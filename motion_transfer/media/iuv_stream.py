@@ -20,6 +20,7 @@ from typing import Literal
 
 import av
 import numpy as np
+from av.error import FFmpegError
 
 from motion_transfer.errors import InputError, IuvFileError
 from motion_transfer.media.iuv_image import (
@@ -34,7 +35,7 @@ from motion_transfer.media.iuv_image import (
 
 LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
 LOSSLESS_REMEDY = (
-    "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt gbrp out.mkv`"
+    "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt bgr0 out.mkv`"
 )
 Missing = Literal["fail", "hold"]
 
@@ -90,7 +91,7 @@ class VideoStream(IuvStream):
                     packet.pts for packet in container.demux(stream) if packet.pts is not None
                 )
                 rate = stream.average_rate or stream.guessed_rate
-        except av.error.FFmpegError as error:
+        except FFmpegError as error:
             raise IuvFileError(
                 f"driver {path} is not a readable video: {error.strerror}"
             ) from error
@@ -114,7 +115,7 @@ class VideoStream(IuvStream):
                     index += 1
                     if index == stop:
                         return
-        except av.error.FFmpegError as error:
+        except FFmpegError as error:
             raise IuvFileError(
                 f"{self.where(index)} cannot be decoded: {error.strerror}"
             ) from error

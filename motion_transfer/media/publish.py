@@ -87,11 +87,11 @@ def publish(finished: Path, final: Path) -> None:
         _sync(file)
     if final.is_dir():  # a folder cannot be replaced in one step: the old one steps aside first
         old = Path(tempfile.mkdtemp(prefix=f".{final.name}.old-", dir=final.parent))
-        os.replace(final, old / final.name)
-        os.replace(finished, final)
+        final.replace(old / final.name)
+        finished.replace(final)
         shutil.rmtree(old)
     else:
-        os.replace(finished, final)
+        finished.replace(final)
     _sync(final.absolute().parent)
 
 

@@ -13,10 +13,11 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, cast
 
 import av
 import numpy as np
+from av.container import InputContainer
 from av.video.reformatter import ColorRange, Colorspace, Interpolation
 from jaxtyping import UInt8
 
@@ -29,14 +30,19 @@ BT709 = 1  # H.273's number for primaries, transfer and matrix
 
 
 class SegmentWriter(ABC):
-    """Takes the frames of one chunk; a context manager that finishes the segment on a clean exit."""
+    """Takes the frames of one chunk; a context manager that completes the segment."""
 
     @abstractmethod
     def write(self, frame: UInt8[np.ndarray, "H W 3"]) -> None:
         """Append a frame."""
 
-    def close(self) -> None:
-        """Finish the segment."""
+    @abstractmethod
+    def finish(self) -> None:
+        """Complete the segment; called once, after the last frame."""
+
+    @abstractmethod
+    def release(self) -> None:
+        """Let go of files; called once, whether the segment was completed or not."""
 
     def __enter__(self) -> Self:
         return self
@@ -47,7 +53,11 @@ class SegmentWriter(ABC):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        try:
+            if kind is None:
+                self.finish()
+        finally:
+            self.release()
 
 
 class FrameSegment(SegmentWriter):
@@ -62,6 +72,12 @@ class FrameSegment(SegmentWriter):
         write_png(self._path / f"{self._index:06d}.png", frame)
         self._index += 1
 
+    def finish(self) -> None:
+        """Every frame is whole on disk already."""
+
+    def release(self) -> None:
+        """Nothing is held open."""
+
 
 class VideoSegment(SegmentWriter):
     """A closed group of pictures in an intermediate container."""
@@ -74,14 +90,15 @@ class VideoSegment(SegmentWriter):
         options = dict(codec.options)
         if output_format.crf is not None:
             options["crf"] = str(output_format.crf)
-        self._stream = self._container.add_stream(codec.encoder, rate=rate, options=options)
+        stream = self._container.add_stream(codec.encoder, rate=rate, options=options)
+        self._stream = cast(av.VideoStream, stream)
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = codec.pixel_format
         context = self._stream.codec_context
         context.thread_count = 1
         context.time_base = 1 / rate
         context.gop_size = 10_000  # one group of pictures a segment; scene cuts may add more
-        self._rgb = codec.pixel_format.startswith("gbr")
+        self._rgb = "bgr" in codec.pixel_format
         if not self._rgb:
             context.colorspace = context.color_primaries = context.color_trc = BT709
             context.color_range = ColorRange.MPEG
@@ -90,7 +107,7 @@ class VideoSegment(SegmentWriter):
     def write(self, frame: UInt8[np.ndarray, "H W 3"]) -> None:
         picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
         picture = (
-            picture.reformat(format="gbrp")
+            picture.reformat(format=self._stream.pix_fmt)
             if self._rgb
             else picture.reformat(
                 format=self._stream.pix_fmt,
@@ -104,11 +121,11 @@ class VideoSegment(SegmentWriter):
         self._index += 1
         self._container.mux(self._stream.encode(picture))
 
-    def close(self) -> None:
-        try:
-            self._container.mux(self._stream.encode(None))
-        finally:
-            self._container.close()
+    def finish(self) -> None:
+        self._container.mux(self._stream.encode(None))
+
+    def release(self) -> None:
+        self._container.close()
 
 
 def segment_path(folder: Path, index: int, output_format: OutputFormat) -> Path:
@@ -186,11 +203,11 @@ def _copy_packets(
 def _showing_order(path: Path, rate: Fraction) -> list[int]:
     """The frame number in its segment of each packet, in decoding order."""
     with av.open(str(path)) as segment:
-        numbers = [round(p.pts * p.time_base * rate) for p in _packets(segment)]
+        numbers = [round((p.pts or 0) * p.time_base * rate) for p in _packets(segment)]
     start = min(numbers)  # the container shifts time so that decoding begins at 0
     return [number - start for number in numbers]
 
 
-def _packets(segment: av.container.InputContainer) -> Iterator[av.Packet]:
+def _packets(segment: InputContainer) -> Iterator[av.Packet]:
     """Packets in decoding order, one a frame; what follows them to flush a decoder is left out."""
     return (packet for packet in segment.demux(video=0) if packet.size)

@@ -16,7 +16,7 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.image import read_photo
-from motion_transfer.media.iuv_image import IUV_SUFFIXES, ChannelOrder
+from motion_transfer.media.iuv_image import IUV_SUFFIXES
 from motion_transfer.media.iuv_stream import IuvReader, open_reader, open_stream
 from motion_transfer.render.neural_renderer import choose_dtype
 from motion_transfer.render.person import find_people

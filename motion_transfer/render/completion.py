@@ -10,7 +10,7 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 from jaxtyping import Float
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from nhrr_core import PART_GROUPS, UVLayout
@@ -61,7 +61,7 @@ def _fill(
     Near the border of what is seen, its pattern continues by reflection at the border; further
     away only a mean of the surroundings can be told.
     """
-    tree = cKDTree(seen)
+    tree = KDTree(seen)
     distance, nearest = tree.query(hidden, k=min(NEIGHBOURS, len(seen)))
     distance, nearest = distance.reshape(len(hidden), -1), nearest.reshape(len(hidden), -1)
     weight = 1 / np.maximum(distance, NEAR_METRES) ** 2

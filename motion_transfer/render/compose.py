@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.render.options import parse_colour
+from motion_transfer.render.person import occupancy
 from motion_transfer.render.source import Source
 from motion_transfer.render.window import Window
 
@@ -45,7 +46,7 @@ def make_background(
 
 def remove_person(photo: Frame, iuv: UInt8[np.ndarray, "H W 3"]) -> Frame:
     """The photo with its person painted over from around."""
-    mask = cv2.min(np.ascontiguousarray(iuv[..., 0]), 1)
+    mask = occupancy(iuv)
     rows = np.flatnonzero(mask.any(1))
     radius = max(2, round((rows[-1] - rows[0] + 1) * PERSON_GROWTH))
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))

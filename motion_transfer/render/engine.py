@@ -53,7 +53,7 @@ class Canvas:
         return width, height
 
 
-class Stopped(Exception):
+class StoppedError(Exception):
     """A worker gives up its chunk because the run is being stopped."""
 
 
@@ -135,7 +135,7 @@ class Engine:
         frames = self._read(chunk)
         while batch := list(islice(frames, self._renderer.batch_size)):
             if self._stop.is_set():
-                raise Stopped
+                raise StoppedError
             crops = np.zeros((self._renderer.batch_size, size, size, 3), np.uint8)
             for slot, iuv in enumerate(batch):
                 crops[slot] = window.cut(iuv, size)

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import UInt8
 
+from motion_transfer.render.person import occupancy
 from motion_transfer.render.source import Source
 from nhrr_core import NeuralReRenderer
 
@@ -57,7 +58,7 @@ def grow_mask(iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S"]:
     """Coverage for a model without alpha: the IUV outline, grown and softened."""
     reach = max(1, round(iuv.shape[0] * MASK_REACH_SHARE))
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    mask = cv2.min(np.ascontiguousarray(iuv[..., 0]), 1) * 255
+    mask = occupancy(iuv) * 255
     return cv2.blur(cv2.dilate(mask, kernel), (reach | 1, reach | 1))
 
 

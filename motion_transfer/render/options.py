@@ -49,7 +49,7 @@ class RenderOptions:
         compare: source, IUV and result side by side.
         sheet: write a contact sheet there.
         force: replace an existing output.
-        workers: threads that render chunks; None: one for each core. The output does not depend on it.
+        workers: threads that render chunks; None: one for each core. Never changes the output.
         compile: let `nhrr` compile the network; None: when the driver is long enough to pay for it.
     """
 

@@ -57,6 +57,11 @@ def find_people(iuv: UInt8[np.ndarray, "H W 3"]) -> People:
     return _find_people(iuv)[0]
 
 
+def occupancy(iuv: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
+    """1 where anybody is, 0 on the background."""
+    return (iuv[..., 0] > 0).astype(np.uint8)
+
+
 def isolate(iuv: UInt8[np.ndarray, "H W 3"], person: Person) -> UInt8[np.ndarray, "H W 3"]:
     """The IUV with everything but one of its people turned into background."""
     _, labels = _find_people(iuv)
@@ -130,7 +135,7 @@ def follow(frames: Sequence[People], first: Person) -> list[Person | None]:
 def _find_people(iuv: UInt8[np.ndarray, "H W 3"]) -> tuple[People, np.ndarray]:
     part = np.ascontiguousarray(iuv[..., 0])
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(
-        cv2.min(part, 1), connectivity=8, ltype=cv2.CV_16U if part.size < 65536 else cv2.CV_32S
+        occupancy(iuv), connectivity=8, ltype=cv2.CV_16U if part.size < 65536 else cv2.CV_32S
     )
     smallest = max(16, SMALLEST_SHARE * part.size)
     by_size = sorted(range(1, count), key=lambda region: -boxes[region, cv2.CC_STAT_AREA])

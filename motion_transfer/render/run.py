@@ -181,7 +181,7 @@ def _canvas(
         if panel_height % 2 or panel_width % 2:
             raise OutputError(
                 f"{options.output}: {output_format.codec_name} cannot hold the odd size"
-                f" {panel_width} x {panel_height}; add --size even, --size crop, or write .gif or PNG"
+                f" {panel_width} x {panel_height}; add --size even or --size crop, or write PNG"
             )
     in_place = options.driver.resolve() == source.iuv_path.resolve()
     background = make_background(options.background, (height, width), source, in_place=in_place)

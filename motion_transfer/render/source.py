@@ -15,13 +15,14 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.image import Photo, read_photo
 from motion_transfer.media.iuv_image import ChannelOrder, decide_order, read_raw_iuv, to_iuv
 from motion_transfer.render.options import Garment, RenderOptions
-from motion_transfer.render.person import choose_person, find_people, isolate
+from motion_transfer.render.person import choose_person, find_people, isolate, occupancy
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
 from nhrr_core.iuv import PART_COUNT, PART_NAMES
 
 SMALLEST_VISIBLE_SHARE = 0.01  # of the texels; a frontal half-length portrait shows about 0.2
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
+SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
 GRABCUT_ROUNDS = 3
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
 
@@ -91,7 +92,7 @@ def unfold(
     if not len(rows):
         blank = torch.zeros(1, 1, texture_size, texture_size)
         return blank.expand(-1, 3, -1, -1), blank
-    margin = round((rows[-1] - rows[0]) * 2 * BAND_SHARE)
+    margin = round((rows[-1] - rows[0]) * SURROUNDINGS_SHARE)
     body = np.s_[
         max(0, rows[0] - margin) : rows[-1] + 1 + margin,
         max(0, columns[0] - margin) : columns[-1] + 1 + margin,
@@ -112,7 +113,7 @@ def trim_outline(
     Only a band along the outline is doubted. In it, GrabCut (Rother et al., SIGGRAPH 2004) decides
     by colour, and the outermost pixels, where photo and outline mix, always go.
     """
-    mask = cv2.min(np.ascontiguousarray(iuv[..., 0]), 1)
+    mask = occupancy(iuv)
     rows = np.flatnonzero(mask.any(1))
     if not len(rows):
         return iuv
@@ -132,15 +133,18 @@ def _cut_out(
     rgb: UInt8[np.ndarray, "H W 3"], mask: UInt8[np.ndarray, "H W"], height: float
 ) -> UInt8[np.ndarray, "H W"]:
     """1 where a person of that height in px is, by colour along the outline of a rough mask."""
-    inner = cv2.erode(mask, _disc(height * BAND_SHARE))
-    outer = cv2.dilate(mask, _disc(height * BAND_SHARE))
-    if not inner.any() or outer.all():
+    band = height * BAND_SHARE
+    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 3)
+    thickness = cv2.dilate(depth, _disc(band))
+    inner = depth >= np.minimum(band, thickness / 2)  # a limb thinner than the band keeps its core
+    outer = cv2.dilate(mask, _disc(band))
+    if outer.all():
         return mask
     labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[inner > 0], labels[outer == 0] = cv2.GC_FGD, cv2.GC_BGD
+    labels[inner & (mask > 0)], labels[outer == 0] = cv2.GC_FGD, cv2.GC_BGD
     cv2.setRNGSeed(0)  # GrabCut starts from k-means
     models = np.zeros((1, 65)), np.zeros((1, 65))
-    cv2.grabCut(rgb, labels, None, *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
+    cv2.grabCut(rgb, labels, (0, 0, 1, 1), *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
     return labels & 1  # the odd labels, GC_FGD and GC_PR_FGD, are the person
 
 

@@ -7,7 +7,6 @@ Reading is three steps, each of which says what it refuses: file -> tensors and 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,7 +58,7 @@ def save_checkpoint(
     temporary = path.with_name(f".{path.name}.part")
     try:
         save_file(state, temporary, metadata=metadata)
-        os.replace(temporary, path)
+        temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
 
