@@ -37,7 +37,7 @@ class FeatureNet(nn.Module):
             _two_convolutions(widths[i], widths[i + 1]) for i in range(DOWN_BLOCKS)
         )
         self.up = nn.ModuleList(
-            _two_convolutions(widths[i + 1] + widths[i], widths[max(i - 1, 0)])
+            _two_convolutions(2 * widths[i], widths[max(i - 1, 0)])
             for i in reversed(range(DOWN_BLOCKS))
         )
         self.exit = nn.Conv2d(widths[0], outputs, 1)

@@ -1,0 +1,50 @@
+# `make demo` and `make test` set up what they need in .venv; nothing else has to be installed first.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+# Tests on real photos run where a folder of samples is at hand, and are skipped elsewhere.
+ifneq ($(wildcard ../shared/data),)
+export MT_SAMPLES ?= $(abspath ../shared/data)
+endif
+
+.PHONY: demo test lint check lock clean
+
+demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion
+	$(BIN)/mt demo --output demo.mp4 --force
+
+test: $(VENV)/.installed-dev  ## run the tests
+	$(BIN)/python -m pytest --numprocesses auto
+
+lint: $(VENV)/.installed-dev  ## style, types, and the direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/lint-imports
+
+check: lint demo test  ## everything that has to pass before a change lands
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: requirements.lock pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	touch $@
+
+$(VENV)/.installed-dev: requirements-dev.lock $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-dev.lock
+	touch $@
+
+lock: $(VENV)/.installed-dev  ## pin anew what pyproject.toml asks for
+	$(BIN)/python -m pip install --quiet pip-tools
+	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
+		--output-file requirements.lock pyproject.toml
+	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
+		--extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
+	sed -i 's/^torch==\([0-9.]*\)+cpu/torch==\1/' requirements.lock requirements-dev.lock
+
+clean:  ## remove what was set up and built
+	rm -rf $(VENV) build dist *.egg-info demo.mp4
