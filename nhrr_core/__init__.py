@@ -5,6 +5,7 @@ Tensors in, tensors out: no files, no devices chosen, nothing printed.
 
 from nhrr_core.config import PRESETS, VARIANTS, ModelConfig
 from nhrr_core.errors import ConfigError, IuvError, NhrrError, ShapeError
+from nhrr_core.fast_render_net import FastRenderNet
 from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import (
     PART_COUNT,
@@ -27,6 +28,7 @@ __all__ = [
     "PRESETS",
     "VARIANTS",
     "ConfigError",
+    "FastRenderNet",
     "FeatureNet",
     "IuvError",
     "ModelConfig",

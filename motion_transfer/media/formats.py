@@ -19,6 +19,7 @@ class Codec:
         pixel_format: of the encoded video.
         crf: constant rate factor that looks transparent; None for a lossless codec.
         options: encoder settings; every one single-threaded, every group of pictures closed.
+        highest_crf: the largest that the encoder takes.
         tag: the four characters that players expect in MP4, if not the default.
     """
 
@@ -26,6 +27,7 @@ class Codec:
     pixel_format: str
     crf: int | None
     options: dict[str, str] = field(default_factory=dict)
+    highest_crf: int = 63
     tag: str | None = None
 
     @property
@@ -34,12 +36,19 @@ class Codec:
 
 
 CODECS = {
-    "h264": Codec("libx264", "yuv420p", 18, {"preset": "faster", "x264-params": "open-gop=0"}),
+    "h264": Codec(
+        "libx264",
+        "yuv420p",
+        18,
+        {"preset": "faster", "x264-params": "open-gop=0"},
+        highest_crf=51,
+    ),
     "h265": Codec(
         "libx265",
         "yuv420p",
         20,
         {"preset": "fast", "x265-params": "open-gop=0:pools=none:frame-threads=1:log-level=none"},
+        highest_crf=51,
         tag="hvc1",
     ),
     "vp9": Codec("libvpx-vp9", "yuv420p", 24, {"b": "0", "cpu-used": "4", "deadline": "good"}),
@@ -92,7 +101,8 @@ def choose_format(output: Path, *, codec: str | None, crf: int | None) -> Output
     chosen = CODECS[name]
     if chosen.encoder not in av.codecs_available:
         raise OutputError(f"the installed FFmpeg has no {chosen.encoder}; choose another --codec")
-    if crf is not None and (chosen.crf is None or not 0 <= crf <= 63):
-        reason = "is lossless and takes no crf" if chosen.crf is None else "takes a crf of 0 to 63"
-        raise OutputError(f"--crf {crf}: {name} {reason}")
+    if crf is not None and (chosen.crf is None or not 0 <= crf <= chosen.highest_crf):
+        takes = "is lossless and takes no crf" if chosen.crf is None else "takes a crf of 0 to"
+        highest = "" if chosen.crf is None else f" {chosen.highest_crf}"
+        raise OutputError(f"--crf {crf}: {name} {takes}{highest}")
     return OutputFormat("video", chosen, name, chosen.crf if crf is None else crf)

@@ -10,6 +10,7 @@ import re
 import shutil
 import tempfile
 import zipfile
+import zlib
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from typing import Literal
 
 import av
 import numpy as np
+from av.container import InputContainer
 from av.error import FFmpegError
 
 from motion_transfer.errors import InputError, IuvFileError
@@ -87,10 +89,15 @@ class VideoStream(IuvStream):
                 stream = container.streams.video[0]
                 codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
                 _check_lossless(path, codec, pixels)
-                self._timestamps = sorted(
-                    packet.pts for packet in container.demux(stream) if packet.pts is not None
+                times = sorted(
+                    (packet.pts, packet.duration or 0)
+                    for packet in container.demux(stream)
+                    if packet.pts is not None
                 )
+                self._timestamps = [pts for pts, _ in times]
                 rate = stream.average_rate or stream.guessed_rate
+                if times and rate and stream.time_base:
+                    _check_whole(path, container, sum(times[-1]) * stream.time_base, 1 / rate)
         except FFmpegError as error:
             raise IuvFileError(
                 f"driver {path} is not a readable video: {error.strerror}"
@@ -272,6 +279,18 @@ def _check_lossless(path: Path, codec: str, pixels: str) -> None:
         )
 
 
+def _check_whole(
+    path: Path, container: InputContainer, end_seconds: Fraction, frame_seconds: Fraction
+) -> None:
+    """Compare where packets end with the length in the header: Matroska breaks off silently."""
+    promised_seconds = Fraction(container.duration or 0, av.time_base)
+    if len(container.streams) == 1 and promised_seconds > end_seconds + frame_seconds / 2:
+        raise IuvFileError(
+            f"driver {path} is truncated: it should last {float(promised_seconds):.2f} s, but ends"
+            f" after {float(end_seconds):.2f} s; export it again"
+        )
+
+
 def _map_array(path: Path) -> np.ndarray:
     """The array of a `.npy`, or the only one of a `.npz`, mapped from disk."""
     try:
@@ -279,12 +298,12 @@ def _map_array(path: Path) -> np.ndarray:
             return np.load(path, mmap_mode="r", allow_pickle=False)
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
             names = archive.namelist()
-            name = "iuv.npy" if "iuv.npy" in names else names[0]
-            if len(names) != 1 and name != "iuv.npy":
+            name = names[0] if len(names) == 1 else "iuv.npy"
+            if name not in names:
                 raise IuvFileError(f"driver {path} holds {len(names)} arrays; name one of them iuv")
             unpacked = Path(folder) / "iuv.npy"  # unlinked at once; the mapping keeps it alive
             with archive.open(name) as packed, unpacked.open("wb") as file:
                 shutil.copyfileobj(packed, file)
             return np.load(unpacked, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error) as error:
         raise IuvFileError(f"driver {path} is not a whole NumPy array: {error}") from error

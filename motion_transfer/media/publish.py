@@ -85,7 +85,8 @@ def publish(finished: Path, final: Path) -> None:
     """Move a finished file or folder of files onto its final name, durably."""
     for file in sorted(finished.iterdir()) if finished.is_dir() else [finished]:
         _sync(file)
-    if final.is_dir():  # a folder cannot be replaced in one step: the old one steps aside first
+    if final.exists() and (final.is_dir() or finished.is_dir()):
+        # a folder cannot be replaced, nor replace a file, in one step: the old one steps aside
         old = Path(tempfile.mkdtemp(prefix=f".{final.name}.old-", dir=final.parent))
         final.replace(old / final.name)
         finished.replace(final)

@@ -7,6 +7,7 @@ chunks only. Time inside segments is counted in frames, exactly.
 
 from __future__ import annotations
 
+import os
 import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
@@ -18,15 +19,19 @@ from typing import Self, cast
 import av
 import numpy as np
 from av.container import InputContainer
+from av.error import FFmpegError
+from av.video.codeccontext import VideoCodecContext
 from av.video.reformatter import ColorRange, Colorspace, Interpolation
 from jaxtyping import UInt8
 
+from motion_transfer.errors import OutputError
 from motion_transfer.media.formats import OutputFormat
 from motion_transfer.media.gif import write_gif
 from motion_transfer.media.image import write_png
 
 SEGMENT_CONTAINER = "nut"  # takes every codec, and any frame rate without rounding
 BT709 = 1  # H.273's number for primaries, transfer and matrix
+os.environ.setdefault("SVT_LOG", "0")  # the AV1 encoder greets on stderr otherwise
 
 
 class SegmentWriter(ABC):
@@ -100,9 +105,16 @@ class VideoSegment(SegmentWriter):
         context.gop_size = 10_000  # one group of pictures a segment; scene cuts may add more
         self._rgb = "bgr" in codec.pixel_format
         if not self._rgb:
-            context.colorspace = context.color_primaries = context.color_trc = BT709
-            context.color_range = ColorRange.MPEG
+            _tag_bt709(context)
         self._index = 0
+        try:
+            context.open()
+        except FFmpegError as error:
+            self._container.close()
+            raise OutputError(
+                f"{codec.encoder} cannot encode {size[0]} x {size[1]} at {rate} frames/s"
+                f" ({error.strerror}); choose another --codec or --fps"
+            ) from error
 
     def write(self, frame: UInt8[np.ndarray, "H W 3"]) -> None:
         picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
@@ -186,6 +198,8 @@ def _copy_packets(
                 if stream is None:
                     stream = output.add_stream_from_template(template, opaque=True)
                     stream.time_base = 1 / rate
+                    if "bgr" not in output_format.codec.pixel_format:
+                        _tag_bt709(stream.codec_context)  # VP9 does not carry all of it itself
                     if output_format.codec.tag and destination.suffix in (".mp4", ".mov"):
                         stream.codec_context.codec_tag = output_format.codec.tag
                 for index, (packet, number) in enumerate(
@@ -198,6 +212,11 @@ def _copy_packets(
                     packet.stream = stream
                     output.mux(packet)
             first += frame_count
+
+
+def _tag_bt709(context: VideoCodecContext) -> None:
+    context.colorspace = context.color_primaries = context.color_trc = BT709
+    context.color_range = ColorRange.MPEG
 
 
 def _showing_order(path: Path, rate: Fraction) -> list[int]:

@@ -47,7 +47,8 @@ def complete_texture(
         if given.sum() < OWN_SHARE * members.sum():
             given = seen  # the limb shows nothing to go by: its neighbours on the body must do
         hidden = members & ~seen
-        values[hidden] = _fill(points[hidden], points[given], values[given])
+        if hidden.any():
+            values[hidden] = _fill(points[hidden], points[given], values[given])
     return torch.from_numpy(values).view(1, TWIN_SIZE, TWIN_SIZE, 3).permute(0, 3, 1, 2)
 
 

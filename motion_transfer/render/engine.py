@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.errors import RenderError
 from motion_transfer.media.formats import OutputFormat
 from motion_transfer.media.iuv_stream import IuvReader
 from motion_transfer.media.segments import join_segments, open_segment, segment_path
@@ -139,8 +140,15 @@ class Engine:
             crops = np.zeros((self._renderer.batch_size, size, size, 3), np.uint8)
             for slot, iuv in enumerate(batch):
                 crops[slot] = window.cut(iuv, size)
-            with self._turn:
-                results = self._renderer.render(crops)
+            try:
+                with self._turn:
+                    results = self._renderer.render(crops)
+            except (RuntimeError, MemoryError) as error:  # what torch raises, out of memory too
+                first = self._plan.first + chunk.start
+                raise RenderError(
+                    f"the {self._renderer.name} renderer failed in the driver's frames {first} to"
+                    f" {first + chunk.stop - chunk.start - 1}: {error}"
+                ) from error
             yield [
                 self._lay_out(iuv, crop, rgba)
                 for iuv, crop, rgba in zip(batch, crops, results, strict=False)

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import torch
 from jaxtyping import UInt8
+from torch import Tensor
 
 from motion_transfer.render.person import occupancy
 from motion_transfer.render.source import Source
-from nhrr_core import NeuralReRenderer
+from nhrr_core import FastRenderNet, NeuralReRenderer, RenderNet
 
 MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leave the IUV
 
 
 class NeuralRenderer:
     """Runs a model on the best device there is, in bf16 where that is fast.
+
+    Compiling happens here, before the first frame is asked for.
 
     A model with an alpha channel says itself what the person covers. One without, as in the paper,
     paints its own background; what lies beyond the (grown, softened) IUV outline is left out.
@@ -34,8 +39,22 @@ class NeuralRenderer:
             self._feature_map = self._model.encode_texture(
                 source.texture.to(self.device), source.visibility.to(self.device)
             )
-        net = self._model.render_net.to(self.dtype, memory_format=torch.channels_last)  # type: ignore[call-overload]
-        self._render_net = torch.compile(net) if compile else net
+        self._draw = self._prepare_net(model.render_net, compile=compile)
+        if compile:
+            side = self._config.image_size
+            self.render(np.zeros((self.batch_size, side, side, 3), np.uint8))
+
+    def _prepare_net(self, net: RenderNet, *, compile: bool) -> Callable[[Tensor], Tensor]:
+        """Float32 features to a float32 frame, in the form that runs fastest here."""
+        if compile and self.device.type == "cpu":
+            fast = FastRenderNet(net, dtype=self.dtype)
+            if self._config.image_size % fast.multiple == 0:
+                return fast
+        plain = net.to(device=self.device, dtype=self.dtype).to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        run = torch.compile(plain) if compile else plain
+        return lambda features: run(
+            features.to(self.dtype, memory_format=torch.channels_last)
+        ).float()
 
     def working_size(self, window_side: int) -> int:
         return self._config.image_size
@@ -44,9 +63,7 @@ class NeuralRenderer:
         with torch.inference_mode():
             target = torch.from_numpy(iuv).to(self.device).permute(0, 3, 1, 2)
             features = self._model.feature_image(self._feature_map, target)
-            features = features.to(self.dtype, memory_format=torch.channels_last)
-            frames = self._render_net(features).float()
-            pixels = ((frames + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
+            pixels = ((self._draw(features) + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
             images = pixels.permute(0, 2, 3, 1).cpu().numpy()
         if images.shape[-1] == 4:
             return images

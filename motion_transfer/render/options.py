@@ -15,6 +15,8 @@ from nhrr_core.iuv import PART_GROUPS, PART_NAMES
 RENDERERS = ("texture", "nhrr")
 SIZES = ("driver", "crop", "even")
 DEFAULT_RATE = Fraction(30)
+LONGEST_RATE_TERM = 2**31 - 1  # what FFmpeg's fractions hold
+RATE_DENOMINATOR = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +149,10 @@ def parse_rate(text: str) -> Fraction:
         ) from None
     if not 0 < rate <= 1000:
         raise InputError(f"fps {text!r}; it must lie between 0 and 1000")
+    if max(rate.numerator, rate.denominator) > LONGEST_RATE_TERM:
+        rate = rate.limit_denominator(RATE_DENOMINATOR)  # 29.97002997002997 is 30000/1001
+    if not rate:
+        raise InputError(f"fps {text!r}; it is too slow for a video")
     return rate
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import time
 from dataclasses import dataclass
 from fractions import Fraction
@@ -74,7 +76,7 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
             f"{options.output} is one picture, but {len(plan.frames)} frames are asked for; choose"
             " one with --frames N, or write a video or a folder"
         )
-    renderer, source = _open_renderer(options, len(plan.frames))
+    renderer, source = _open_renderer(options, len(plan.frames), listener)
     canvas = _canvas(options, output_format, reader, plan, renderer, source)
     width, height = canvas.size
     sheet = ContactSheet(len(plan.frames)) if options.sheet else None
@@ -142,7 +144,9 @@ def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, Driver
     return reader, plan
 
 
-def _open_renderer(options: RenderOptions, frame_count: int) -> tuple[Renderer, Source]:
+def _open_renderer(
+    options: RenderOptions, frame_count: int, listener: Listener
+) -> tuple[Renderer, Source]:
     """The renderer that the options name, with its source. Imports what it needs, when needed."""
     if options.renderer_name == "texture":
         from motion_transfer.render.texture_renderer import TextureRenderer
@@ -156,8 +160,25 @@ def _open_renderer(options: RenderOptions, frame_count: int) -> tuple[Renderer, 
         raise InputError("the nhrr renderer needs weights")
     model = load_checkpoint(options.weights)
     source = prepare_source(options, model.config.texture_size)
-    compile = options.compile if options.compile is not None else frame_count >= COMPILE_PAYS_FRAMES
-    return NeuralRenderer(model, source, compile=compile), source
+    if not _decide_compile(options.compile, frame_count):
+        return NeuralRenderer(model, source, compile=False), source
+    listener(Notice("compiling the network, half a minute at most; later runs find it done"))
+    began = time.perf_counter()
+    renderer = NeuralRenderer(model, source, compile=True)
+    listener(Notice(f"compiled in {time.perf_counter() - began:.0f} s"))
+    return renderer, source
+
+
+def _decide_compile(wish: bool | None, frame_count: int) -> bool:
+    """Whether to compile. Raises: InputError if it is asked for and there is no compiler."""
+    compiler = os.environ.get("CXX") or next(filter(shutil.which, ("g++", "clang++")), None)
+    if wish and compiler is None:
+        raise InputError(
+            "--compile needs a C++ compiler, g++ or clang++; install one, or leave it out"
+        )
+    if wish is None:
+        return compiler is not None and frame_count >= COMPILE_PAYS_FRAMES
+    return wish
 
 
 def _canvas(

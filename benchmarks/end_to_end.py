@@ -1,0 +1,121 @@
+"""End to end against the model alone, and the draft's frames per second.
+
+    python benchmarks/end_to_end.py [--frames 600] [--preset paper] [--rounds 3]
+
+Prints medians and ratios of one run:
+* `texture`: frames per second of a whole run at 256 x 256 (plan, decode, render, encode);
+* `nhrr`: time a frame of a whole run's rendering (decode, model, paste, encode) over the model
+  alone, on the same frames in the same batches, compiled;
+* start-up: `mt --help` as a process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from workload import SOURCE, driver_folder, random_checkpoint
+
+from motion_transfer.media.formats import choose_format
+from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.render.engine import Canvas, Engine
+from motion_transfer.render.events import ignore
+from motion_transfer.render.neural_renderer import NeuralRenderer
+from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.plan import plan_driver
+from motion_transfer.render.run import run
+from motion_transfer.render.source import prepare_source
+from motion_transfer.weights import load_checkpoint
+
+
+def texture_rate(folder: Path, frame_count: int, rounds: int) -> None:
+    driver = driver_folder(folder, frame_count)
+    options = RenderOptions(source=SOURCE, driver=driver, output=folder / "texture.mp4", force=True)
+    rates = [frame_count / run(options).wall_seconds for _ in range(rounds)]
+    print(
+        f"texture, 256 x 256, {frame_count} PNG frames, end to end:"
+        f" median {statistics.median(rates):.0f} frames/s (of {rounds}: {min(rates):.0f}"
+        f" to {max(rates):.0f})"
+    )
+
+
+def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> None:
+    driver = driver_folder(folder, frame_count)
+    options = RenderOptions(
+        source=SOURCE,
+        driver=driver,
+        output=folder / "nhrr.mp4",
+        weights=random_checkpoint(folder, preset),
+    )
+    model = load_checkpoint(random_checkpoint(folder, preset))
+    source = prepare_source(options, model.config.texture_size)
+    began = time.perf_counter()
+    renderer = NeuralRenderer(model, source, compile=True)
+    batch = np.zeros((renderer.batch_size, 256, 256, 3), np.uint8)
+    renderer.render(batch)
+    print(f"nhrr, {preset}: compiled in {time.perf_counter() - began:.0f} s")
+
+    reader = open_reader(open_stream(driver))
+    plan = plan_driver(
+        reader, frames=(None, None), frame_rate=30, person="largest", workers=2, done=ignore
+    )
+    crops = np.stack([plan.window.cut(iuv, 256) for iuv in reader.read(0, renderer.batch_size)])
+    background = np.full((reader.height, reader.width, 3), 255, np.uint8)
+    ratios = []
+    for index in range(rounds):
+        began = time.perf_counter()
+        for _ in range(frame_count // renderer.batch_size):
+            renderer.render(crops)
+        alone = (time.perf_counter() - began) / frame_count
+        with tempfile.TemporaryDirectory(dir=folder) as work:
+            began = time.perf_counter()
+            Engine(
+                reader=reader,
+                plan=plan,
+                renderer=renderer,
+                canvas=Canvas(background, crop=False, comparison=None),
+                output_format=choose_format(options.output, codec=None, crf=None),
+                workers=2,
+                sheet=None,
+                listener=ignore,
+            ).run(Path(work), folder / f"nhrr_{index}.mp4")
+            whole = (time.perf_counter() - began) / frame_count
+        ratios.append(whole / alone)
+        print(f"  model {alone * 1e3:.1f} ms a frame, end to end {whole * 1e3:.1f} ms")
+    print(f"nhrr, {preset}: end to end over model alone, median {statistics.median(ratios):.3f}")
+
+
+def start_up(rounds: int) -> None:
+    seconds = []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        subprocess.run(
+            [sys.executable, "-m", "motion_transfer", "--help"], check=True, capture_output=True
+        )
+        seconds.append(time.perf_counter() - began)
+    print(f"mt --help: median {statistics.median(seconds):.2f} s")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=600)
+    parser.add_argument("--nhrr-frames", type=int, default=96)
+    parser.add_argument("--preset", default="paper")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--folder", type=Path, help="keep the made files there")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.folder or Path(temporary)
+        start_up(arguments.rounds + 2)
+        texture_rate(folder, arguments.frames, arguments.rounds)
+        nhrr_overhead(folder, arguments.nhrr_frames, arguments.preset, arguments.rounds)
+
+
+if __name__ == "__main__":
+    main()

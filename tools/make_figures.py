@@ -1,0 +1,108 @@
+"""Make the README's two pictures from the demo's own files: `python tools/make_figures.py`.
+
+`docs/demo.png`: the photo, and the motion over the result at six moments.
+`docs/how_it_works.png`: what each step of the method hands to the next.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from motion_transfer.media.image import read_photo
+from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.render.completion import complete_texture
+from motion_transfer.render.compose import colour_iuv, paste
+from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.source import prepare_source
+from motion_transfer.render.texture_renderer import TextureRenderer
+from motion_transfer.render.window import Window
+from nhrr_core import load_uv_layout
+
+ROOT = Path(__file__).parents[1]
+DEMO = ROOT / "motion_transfer" / "demo"
+MOMENTS = (0, 12, 30, 45, 60, 78)
+PANEL_PX = 240
+LABEL_PX = 44
+
+
+def main() -> None:
+    options = RenderOptions(
+        source=DEMO / "source.png", driver=DEMO / "driver.mkv", output=Path("unused.mp4")
+    )
+    source = prepare_source(options, 256)
+    reader = open_reader(open_stream(options.driver))
+    renderer = TextureRenderer(source)
+    targets = [next(iter(reader.read(moment, moment + 1))) for moment in MOMENTS]
+    results = []
+    for iuv in targets:
+        frame = np.full_like(iuv, 255)
+        paste(frame, renderer.render(iuv[None])[0], Window(0, 0, iuv.shape[0]))
+        results.append(frame)
+
+    cut = [np.s_[:, 28:228]] * len(targets)
+    rows = [
+        np.hstack([colour_iuv(iuv)[c] for iuv, c in zip(targets, cut, strict=True)]),
+        np.hstack([frame[c] for frame, c in zip(results, cut, strict=True)]),
+    ]
+    photo = read_photo(options.source).rgb
+    height = 2 * rows[0].shape[0]
+    photo = cv2.resize(
+        photo,
+        (round(photo.shape[1] * height / photo.shape[0]), height),
+        interpolation=cv2.INTER_AREA,
+    )
+    save(ROOT / "docs" / "demo.png", np.hstack([photo, np.vstack(rows)]))
+
+    full = complete_texture(source.texture, source.visibility, load_uv_layout())
+    partial = np.where(source.visibility[0, 0, ..., None] > 0, picture(source.texture), 255)
+    save(
+        ROOT / "docs" / "how_it_works.png",
+        np.hstack(
+            [
+                panel(source.photo.rgb, "source photo"),
+                panel(colour_iuv(source.iuv), "its IUV"),
+                panel(partial.astype(np.uint8), "partial texture: what is seen"),
+                panel(picture(full), "completed, once per source"),
+                panel(colour_iuv(targets[1]), "target IUV, per frame"),
+                panel(results[1], "frame"),
+            ]
+        ),
+    )
+
+
+def picture(texture) -> np.ndarray:
+    """A texture in [-1, 1] as an RGB picture."""
+    return ((texture[0].permute(1, 2, 0).numpy() + 1) * 127.5).round().clip(0, 255).astype(np.uint8)
+
+
+def panel(image: np.ndarray, label: str) -> np.ndarray:
+    """An image fitted into a white square, with a line of text below."""
+    scale = min(PANEL_PX / image.shape[0], PANEL_PX / image.shape[1])
+    size = round(image.shape[1] * scale), round(image.shape[0] * scale)
+    fitted = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    square = np.full((PANEL_PX + LABEL_PX, PANEL_PX + 16, 3), 255, np.uint8)
+    top, left = (PANEL_PX - size[1]) // 2, (PANEL_PX + 16 - size[0]) // 2
+    square[top : top + size[1], left : left + size[0]] = fitted
+    canvas = Image.fromarray(square)
+    ImageDraw.Draw(canvas).text(
+        ((PANEL_PX + 16) / 2, PANEL_PX + 20),
+        label,
+        fill=(60, 60, 60),
+        anchor="mm",
+        font=ImageFont.load_default(15),
+    )
+    return np.array(canvas)
+
+
+def save(path: Path, image: np.ndarray) -> None:
+    path.parent.mkdir(exist_ok=True)
+    Image.fromarray(image).quantize(192, dither=Image.Dither.NONE).save(path, optimize=True)
+    print(f"{path}: {image.shape[1]} x {image.shape[0]}, {path.stat().st_size // 1024} KiB")
+
+
+if __name__ == "__main__":
+    main()
