@@ -61,9 +61,8 @@ class FastRenderNet(nn.Module):
             self._compile(winograd)
 
     def _compile(self, winograd: bool) -> None:
-        frozen: dict[str, Any] = {
-            "freezing": True
-        }  # lets oneDNN pack weights once instead of at every call
+        # freezing lets oneDNN pack the weights once instead of at every call
+        frozen: dict[str, Any] = {"freezing": True}
         self.encoder = torch.compile(self.encoder, dynamic=False, options=frozen)
         self.decoder = torch.compile(self.decoder, dynamic=False, options=frozen)
         if winograd and isinstance(self.trunk, _Trunk):
@@ -129,7 +128,7 @@ class _Decoder(nn.Module):
         block = torch.stack(places, 1).flatten(0, 1)
         self.weights = _constants([*(layer.weight for layer in convolutions), block], dtype)
         bias = torch.zeros(len(last.weight)) if last.bias is None else last.bias
-        self.bias = nn.Parameter(bias.detach().float().view(-1, 1, 1), requires_grad=False)
+        self.bias = nn.Parameter(bias.detach().float().clone().view(-1, 1, 1), requires_grad=False)
 
     def forward(self, x: Tensor) -> Tensor:
         *up, last = self.weights
@@ -172,6 +171,7 @@ def _constants(tensors: Iterable[Tensor], dtype: torch.dtype) -> nn.ParameterLis
             tensor.detach().to(
                 dtype,
                 memory_format=torch.channels_last if tensor.ndim == 4 else torch.contiguous_format,
+                copy=True,
             ),
             requires_grad=False,
         )

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from nhrr_core.errors import ShapeError
 from nhrr_core.iuv import check_iuv
-from nhrr_core.uv_layout import chart_index, texture_coordinates
+from nhrr_core.uv_layout import CHART_SIZE, chart_index, texture_coordinates
 
 MAX_CHART_STEP = 0.15
 """Neighbouring pixels whose U or V differ by more lie on separate pieces of the surface."""
@@ -16,8 +16,11 @@ MAX_CHART_STEP = 0.15
 MAX_STRETCH_TEXELS = 16
 """So do neighbours that land further apart in the texture."""
 
-SAMPLES_PER_TEXEL = 1.5
-"""Spacing of the points that fill between pixels; above sqrt(2), so that no texel is missed."""
+SAMPLES_PER_TEXEL = 3.0
+"""Density of the points that fill between pixels, so that none is missed where charts bend."""
+
+MAX_ENTRY_STEP = 0.03
+"""Neighbouring entries of the lookup table further apart lie on two sides of a texture seam."""
 
 
 def extract_texture(
@@ -115,7 +118,7 @@ def _quads_by_steps(
     wanted = stretch * SAMPLES_PER_TEXEL
     quad = torch.arange(part[0].numel(), device=iuv.device).view_as(part[0])
     groups, low = [], SAMPLES_PER_TEXEL  # at most one texel apart: no texel lies between
-    for steps in (2, 4, 8, 16, 32):
+    for steps in (4, 8, 16, 32, 64):
         chosen = joined & (wanted > low) & (wanted <= steps)
         low = max(low, steps)
         if chosen.any():
@@ -139,8 +142,26 @@ def _fill_points(
 
     values = torch.einsum("kp,kqc->qpc", weights, _corners(colours)[:, chosen])
     chart_uv = _corners(iuv[:, 1:].permute(0, 2, 3, 1).to(colours.dtype))[:, chosen]
-    u, v = torch.einsum("kp,kqc->qpc", weights, chart_uv).round().long().unbind(-1)
-    part = iuv[:, 0, :-1, :-1][chosen].long()[:, None].expand_as(u)
-    place = charts.view(-1, 2)[chart_index(part, u, v)]
+    between = torch.einsum("kp,kqc->qpc", weights, chart_uv)
+    part = iuv[:, 0, :-1, :-1][chosen].long()[:, None].expand(between.shape[:-1])
+    place = _place_between_entries(charts, part, between)
     batch = quad[chosen].div(quad[0].numel(), rounding_mode="floor")[:, None]
     return values.flatten(0, 1), _texel(place, batch, size).flatten()
+
+
+def _place_between_entries(
+    charts: Float[Tensor, "24 256 256 2"], part: Int64[Tensor, "Q P"], uv: Float[Tensor, "Q P 2"]
+) -> Float[Tensor, "Q P 2"]:
+    """Texture coordinates of fractional (U, V), bilinear in the table; across a seam, the nearest."""
+    low = uv.floor().clamp(0, CHART_SIZE - 2)
+    (right, down), (u, v) = (uv - low).unbind(-1), low.long().unbind(-1)
+    table = charts.view(-1, 2)
+    corners = torch.stack([table[chart_index(part, u + x, v + y)] for y in (0, 1) for x in (0, 1)])
+    weights = torch.stack(
+        [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
+    )
+    smooth = (corners.amax(0) - corners.amin(0)).amax(-1, keepdim=True) <= MAX_ENTRY_STEP
+    u, v = uv.round().long().unbind(-1)
+    return torch.where(
+        smooth, (weights[..., None] * corners).sum(0), table[chart_index(part, u, v)]
+    )

@@ -49,8 +49,8 @@ def cli() -> None:
     """
 
 
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, handled like Ctrl-C but for the exit code."""
+class Terminated(BaseException):
+    """SIGTERM; not a KeyboardInterrupt, as click would take it for Ctrl-C."""
 
 
 def main(arguments: list[str] | None = None) -> int:

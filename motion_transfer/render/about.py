@@ -16,7 +16,7 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.image import read_photo
-from motion_transfer.media.iuv_image import IUV_SUFFIXES
+from motion_transfer.media.iuv_image import CHANNEL_ORDERS, IUV_SUFFIXES
 from motion_transfer.media.iuv_stream import IuvReader, open_reader, open_stream
 from motion_transfer.render.neural_renderer import choose_dtype
 from motion_transfer.render.person import find_people
@@ -95,6 +95,8 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
     """What a file or folder holds. Raises: InputError if it is nothing that `mt` reads."""
     if not path.exists():
         raise InputError(f"{path} does not exist")
+    if order is not None and order not in CHANNEL_ORDERS:
+        raise InputError(f"channel order {order!r}; supported are {', '.join(CHANNEL_ORDERS)}")
     if path.suffix == ".safetensors":
         return _describe_weights(path)
     if path.is_file() and path.suffix.lower() not in (*IUV_SUFFIXES, ".npy", ".npz"):

@@ -1,0 +1,88 @@
+"""Stopped in the middle of its work, a run leaves nothing, and an older output stays as it was."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+LENGTH = 4000  # frames; far more than are rendered before the signal comes
+
+
+def long_driver(studio) -> Path:
+    """A folder of three files whose numbering has a gap to be held: long, but small on disk."""
+    driver = studio.driver(3)
+    studio.image(f"driver/frame_{LENGTH}_IUV.png", studio.iuv())
+    return driver
+
+
+def start(studio, *more: object) -> subprocess.Popen[str]:
+    arguments = [
+        *("run", "--source", studio.source(), "--driver", long_driver(studio)),
+        *("--missing", "hold", "-o", studio.folder / "new/out.mp4", "--json", *more),
+    ]
+    command = [sys.executable, "-m", "motion_transfer", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(process: subprocess.Popen[str], stage: str) -> None:
+    """Read events until the stage has made progress."""
+    assert process.stdout is not None
+    current = None
+    for line in process.stdout:
+        event = json.loads(line)
+        if event["event"] == "stage":
+            current = event["name"]
+        if event["event"] == "framesdone" and current == stage:
+            return
+    raise AssertionError(f"the run ended before the stage {stage}: {process.communicate()[1]}")
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "word", "stage"),
+    [
+        (signal.SIGINT, 130, "interrupted", "scan"),
+        (signal.SIGINT, 130, "interrupted", "render"),
+        (signal.SIGTERM, 143, "terminated", "render"),
+    ],
+)
+def test_nothing_is_left_behind(studio, number: int, code: int, word: str, stage: str) -> None:
+    with start(studio) as process:
+        before = {path for path in studio.folder.rglob("*") if "new" not in path.parts}
+        wait_for(process, stage)
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert errors.splitlines()[-1] == f"mt: {word}, nothing was left behind"
+    assert "Traceback" not in errors
+    assert set(studio.folder.rglob("*")) == before
+
+
+def test_an_older_output_survives(studio) -> None:
+    output = studio.folder / "new/out.mp4"
+    output.parent.mkdir()
+    output.write_text("old")
+    with start(studio, "--force") as process:
+        wait_for(process, "render")
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert output.read_text() == "old"
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_a_closed_pipe_is_no_traceback(studio) -> None:
+    with start(studio, "--frames", ":200") as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr is not None
+        errors = process.stderr.read()
+        process.wait(60)
+    assert process.returncode not in (0, None)
+    assert "Traceback" not in errors
+    assert not (studio.folder / "new").exists()

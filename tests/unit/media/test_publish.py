@@ -1,0 +1,115 @@
+"""Final names hold something whole or nothing."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from motion_transfer.errors import OutputError
+from motion_transfer.media.publish import (
+    check_destination,
+    explain_disk_errors,
+    publish,
+    work_folder,
+)
+
+
+def put(path: Path, content: str) -> Path:
+    """Write a file (a name with an ending) or a folder of one frame."""
+    if path.suffix:
+        path.write_text(content)
+    else:
+        path.mkdir()
+        (path / "000000.png").write_text(content)
+    return path
+
+
+def contents(path: Path) -> str:
+    return ((path / "000000.png") if path.is_dir() else path).read_text()
+
+
+@pytest.mark.parametrize("name", ["out.mp4", "out", "new/deep/out.mp4", "new/deep/out"])
+def test_a_finished_work_gets_its_name(tmp_path: Path, name: str) -> None:
+    final = tmp_path / name
+    with work_folder(final) as folder:
+        assert folder.name.startswith(".")
+        publish(put(folder / f"finished{final.suffix}", "new"), final)
+    assert contents(final) == "new"
+    assert [item.name for item in final.parent.iterdir()] == [final.name]
+
+
+@pytest.mark.parametrize("old", ["file", "folder"])
+@pytest.mark.parametrize("new", ["finished.mp4", "finished"])
+def test_an_older_output_is_replaced(tmp_path: Path, old: str, new: str) -> None:
+    final = tmp_path / "out"
+    if old == "file":
+        final.write_text("old")
+    else:
+        put(final, "old")
+        (final / "000001.png").write_text("old")
+    with work_folder(final) as folder:
+        publish(put(folder / new, "new"), final)
+    assert contents(final) == "new"
+    assert [item.name for item in tmp_path.iterdir()] == ["out"]
+    assert final.is_file() or [item.name for item in final.iterdir()] == ["000000.png"]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_failure_leaves_nothing_behind(tmp_path: Path, error: type[BaseException]) -> None:
+    with pytest.raises(error), work_folder(tmp_path / "new/deep/out.mp4") as folder:
+        put(folder / "half.mp4", "half")
+        raise error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failure_leaves_folders_that_others_use(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), work_folder(tmp_path / "new/deep/out.mp4"):
+        put(tmp_path / "new/theirs.txt", "theirs")
+        raise RuntimeError
+    assert [item.name for item in (tmp_path / "new").iterdir()] == ["theirs.txt"]
+
+
+def test_an_existing_output_needs_force(tmp_path: Path) -> None:
+    final = put(tmp_path / "out.mp4", "old")
+    with pytest.raises(OutputError, match=r"exists already.*--force"):
+        check_destination(final, force=False)
+    check_destination(final, force=True)
+
+
+def test_a_folder_of_other_things_is_never_replaced(tmp_path: Path) -> None:
+    put(tmp_path / "out", "frame")
+    check_destination(tmp_path / "out", force=True)
+    put(tmp_path / "out/thesis.txt", "years of work")
+    with pytest.raises(OutputError, match="other things than frames"):
+        check_destination(tmp_path / "out", force=True)
+
+
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
+    put(tmp_path / "notes.txt", "")
+    with pytest.raises(OutputError, match=r"notes\.txt is not a folder"):
+        check_destination(tmp_path / "notes.txt/deep/out.mp4", force=False)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_read_only_folder_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o500)
+    with pytest.raises(OutputError, match="no permission to write"):
+        check_destination(folder / "out.mp4", force=False)
+
+
+@pytest.mark.parametrize(
+    ("number", "reason"), [(errno.ENOSPC, "disk is full"), (errno.EROFS, "read-only")]
+)
+def test_disk_errors_are_explained(number: int, reason: str) -> None:
+    refused = pytest.raises(OutputError, match=f"out.mp4: .*{reason}")
+    with refused, explain_disk_errors(Path("out.mp4")):
+        raise OSError(number, os.strerror(number))
+
+
+def test_other_errors_pass() -> None:
+    with pytest.raises(ZeroDivisionError), explain_disk_errors(Path("out.mp4")):
+        raise ZeroDivisionError

@@ -1,0 +1,333 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from nhrr_core import (
+    VARIANTS,
+    IuvError,
+    ModelConfig,
+    NeuralReRenderer,
+    ShapeError,
+    extract_texture,
+    normalise_iuv,
+    sample_features,
+)
+
+SMALL = ModelConfig(
+    feature_width=2, render_width=4, residual_blocks=1, texture_size=64, image_size=32
+)
+
+
+def small(**changes: Any) -> NeuralReRenderer:
+    return NeuralReRenderer(ModelConfig.from_dict({**SMALL.to_dict(), **changes})).eval()
+
+
+@pytest.fixture
+def photo() -> Tensor:
+    return torch.rand(1, 3, 32, 32) * 2 - 1
+
+
+@pytest.fixture
+def iuv(ramp) -> Tensor:
+    """One person of torso and head on 32 x 32 px."""
+    torso, head = ramp(2, 24, 12, border=4), ramp(23, 24, 12, border=4)
+    return torch.cat([torso, head[..., :12]], dim=3)
+
+
+@pytest.fixture
+def targets(iuv: Tensor) -> Tensor:
+    """Three poses: as it was, moved down, moved to the right."""
+    return torch.cat([iuv, iuv.roll(4, dims=2), iuv.roll(4, dims=3)])
+
+
+@pytest.mark.parametrize("alpha", [False, True])
+@pytest.mark.parametrize(
+    ("variant", "map_channels", "render_inputs"),
+    [("full", 16, 16), ("no-int", 16, 16), ("ip", 3, 3), ("warp", 3, 3), ("warp-cond", 3, 6)],
+)
+def test_variant(
+    photo: Tensor,
+    iuv: Tensor,
+    targets: Tensor,
+    variant: str,
+    map_channels: int,
+    render_inputs: int,
+    alpha: bool,
+) -> None:
+    model = small(variant=variant, alpha=alpha)
+    with torch.no_grad():
+        feature_map = model.encode(photo, iuv)
+        image = model.feature_image(feature_map, targets)
+        frames = model.render(feature_map, targets)
+    assert feature_map.shape == (1, map_channels, 64, 64)
+    assert image.shape == (3, render_inputs, 32, 32)
+    assert frames.shape == (3, 4 if alpha else 3, 32, 32)
+    assert frames.min() >= -1 and frames.max() <= 1
+    assert model.config.variant == variant
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_first_convolutions_have_the_variant_s_channels(variant: str) -> None:
+    model = small(variant=variant)
+    entry = next(m for m in model.render_net.modules() if isinstance(m, nn.Conv2d))
+    expected = {"full": 16, "no-int": 16, "ip": 3, "warp": 3, "warp-cond": 6}
+    assert entry.in_channels == expected[variant]
+    if variant.startswith("warp"):
+        assert model.feature_net is None
+    else:
+        assert model.feature_net is not None
+        assert model.feature_net.entry[0].in_channels == 4
+
+
+def test_paper_sized_model_has_d_16() -> None:
+    with torch.device("meta"):
+        feature_net = NeuralReRenderer(ModelConfig()).feature_net
+    assert feature_net is not None
+    assert feature_net.exit.out_channels == 16
+
+
+@pytest.mark.parametrize("variant", ["warp", "warp-cond"])
+def test_warp_encodes_to_the_partial_texture(photo: Tensor, iuv: Tensor, variant: str) -> None:
+    model = small(variant=variant)
+    texture, _ = extract_texture(photo, iuv, model.charts, 64)
+    assert texture.count_nonzero() > 0
+    assert torch.equal(model.encode(photo, iuv), texture)
+
+
+def test_encode_is_feature_net_of_texture_and_visibility(photo: Tensor, iuv: Tensor) -> None:
+    model = small()
+    assert model.feature_net is not None
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    expected = model.feature_net(torch.cat([texture, visibility], dim=1))
+    assert torch.equal(model.encode(photo, iuv), expected)
+    assert torch.equal(model.encode_texture(texture, visibility), expected)
+
+
+def test_visibility_can_be_left_out(photo: Tensor, iuv: Tensor) -> None:
+    model = small(visibility_input=False)
+    assert model.feature_net is not None
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    expected = model.feature_net(texture)
+    assert torch.equal(model.encode(photo, iuv), expected)
+    assert torch.equal(model.encode_texture(texture, 1 - visibility), expected)
+
+
+def test_visibility_matters_where_it_is_an_input(photo: Tensor, iuv: Tensor) -> None:
+    model = small()
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    seen, unseen = (model.encode_texture(texture, v) for v in (visibility, 1 - visibility))
+    assert not torch.allclose(seen, unseen)
+
+
+def test_render_net_sees_the_sampled_map(targets: Tensor) -> None:
+    model = small()
+    feature_map = torch.rand(1, 16, 64, 64)
+    features = sample_features(feature_map, targets, model.charts)
+    assert torch.equal(model.feature_image(feature_map, targets), features)
+    assert torch.equal(model.render(feature_map, targets), model.render_net(features))
+
+
+def test_warp_cond_sees_the_target_iuv_too(targets: Tensor) -> None:
+    model = small(variant="warp-cond")
+    texture = torch.rand(1, 3, 64, 64)
+    image = model.feature_image(texture, targets)
+    assert torch.equal(image[:, :3], sample_features(texture, targets, model.charts))
+    assert torch.equal(image[:, 3:], normalise_iuv(targets))
+
+
+@pytest.mark.parametrize("side", [256, 512])
+def test_image_sizes(side: int, ramp) -> None:
+    config = ModelConfig(
+        feature_width=1, render_width=1, residual_blocks=1, texture_size=64, image_size=side
+    )
+    model = NeuralReRenderer(config).eval()
+    iuv = ramp(2, side // 2, border=side // 4)
+    with torch.no_grad():
+        frame = model(torch.rand(1, 3, side, side), iuv, iuv)
+    assert frame.shape == (1, 3, side, side)
+    assert frame.isfinite().all()
+
+
+def test_photo_and_target_may_differ_in_size(photo: Tensor, iuv: Tensor, ramp) -> None:
+    frame = small()(photo, iuv, ramp(2, 8, 40, border=4))
+    assert frame.shape == (1, 3, 16, 48)
+
+
+def test_forward_is_encode_then_render(photo: Tensor, iuv: Tensor) -> None:
+    model = small()
+    target = iuv.roll(4, dims=3)
+    with torch.no_grad():
+        both = model.render(model.encode(photo, iuv), target)
+        assert torch.equal(model(photo, iuv, target), both)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_rendering_a_batch_equals_one_by_one(
+    photo: Tensor, iuv: Tensor, targets: Tensor, variant: str
+) -> None:
+    model = small(variant=variant)
+    with torch.no_grad():
+        feature_map = model.encode(photo, iuv)
+        together = model.render(feature_map, targets)
+        alone = torch.cat([model.render(feature_map, target[None]) for target in targets])
+    torch.testing.assert_close(together, alone, rtol=0, atol=1e-4)
+    assert not torch.allclose(together[0], together[1], atol=1e-2)
+
+
+def test_each_target_may_have_its_own_source(iuv: Tensor, targets: Tensor) -> None:
+    model = small()
+    photos = torch.rand(3, 3, 32, 32)
+    with torch.no_grad():
+        maps = model.encode(photos, iuv.repeat(3, 1, 1, 1))
+        together = model.render(maps, targets)
+        for i in range(3):
+            alone = model.render(maps[i : i + 1], targets[i : i + 1])
+            torch.testing.assert_close(together[i : i + 1], alone, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize(("down_blocks", "shape"), [(3, (36, 32)), (3, (32, 20)), (2, (34, 32))])
+def test_target_of_a_wrong_size_raises(down_blocks: int, shape: tuple[int, int]) -> None:
+    model = small(down_blocks=down_blocks)
+    target = torch.zeros(1, 3, *shape, dtype=torch.uint8)
+    with pytest.raises(ShapeError) as raised:
+        model.render(torch.rand(1, 16, 64, 64), target)
+    message = f"target IUV [1, 3, {shape[0]}, {shape[1]}]: its sides must be multiples of"
+    assert str(raised.value) == f"{message} {2**down_blocks}"
+
+
+def test_texture_of_a_wrong_size_raises() -> None:
+    with pytest.raises(ShapeError) as raised:
+        small().encode_texture(torch.rand(1, 3, 40, 40), torch.ones(1, 1, 40, 40))
+    message = "texture [1, 3, 40, 40]: its sides must be multiples of 16"
+    assert str(raised.value) == message
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_numbers_of_maps_and_targets_that_differ_raise(targets: Tensor) -> None:
+    with pytest.raises(ShapeError, match="2 feature maps for 3 IUV images"):
+        small().render(torch.rand(2, 16, 64, 64), targets)
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_photo_and_iuv_that_differ_raise(photo: Tensor, iuv: Tensor) -> None:
+    with pytest.raises(ShapeError, match="do not match"):
+        small().encode(photo[..., :16], iuv)
+
+
+def test_part_above_24_raises(photo: Tensor, iuv: Tensor) -> None:
+    iuv[0, 0, 0, 0] = 40
+    with pytest.raises(IuvError, match="part index 40"):
+        small().encode(photo, iuv)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_state_dict_round_trip(
+    photo: Tensor, iuv: Tensor, targets: Tensor, variant: str, tmp_path: Path
+) -> None:
+    model, other = small(variant=variant, alpha=True), small(variant=variant, alpha=True)
+    torch.save(model.state_dict(), tmp_path / "state.pt")
+    with torch.no_grad():
+        wanted = model.render(model.encode(photo, iuv), targets)
+        before = other.render(other.encode(photo, iuv), targets)
+        assert not torch.allclose(before, wanted)
+        other.load_state_dict(torch.load(tmp_path / "state.pt", weights_only=True))
+        assert torch.equal(other.render(other.encode(photo, iuv), targets), wanted)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_state_dict_holds_networks_only(variant: str) -> None:
+    model = small(variant=variant)
+    networks = {key.split(".")[0] for key in model.state_dict()}
+    assert networks == ({"feature_net"} if model.feature_net else set()) | {"render_net"}
+    assert "charts" in dict(model.named_buffers())
+
+
+def test_models_do_not_share_their_charts() -> None:
+    one, two = small(), small()
+    one.charts.zero_()
+    assert two.charts.count_nonzero() > 0
+    assert small().charts.count_nonzero() > 0
+
+
+def test_gradient_reaches_both_networks_and_the_photo(iuv: Tensor, targets: Tensor) -> None:
+    model = small().train()
+    photo = torch.rand(1, 3, 32, 32, requires_grad=True)
+    frames = model.render(model.encode(photo, iuv), targets)
+    (frames * torch.rand_like(frames)).sum().backward()
+    body = iuv[:, 0] > 0
+    assert photo.grad is not None
+    assert (photo.grad.abs().sum(1)[body] > 0).all()
+    assert (photo.grad.abs().sum(1)[~body] == 0).all()
+    for name, parameter in model.named_parameters():
+        assert parameter.grad is not None, name
+        if name.endswith("weight"):
+            assert parameter.grad.abs().sum() > 0, name
+
+
+def test_background_of_the_photo_does_not_matter(photo: Tensor, iuv: Tensor) -> None:
+    model = small()
+    other = torch.where(iuv[:, :1] > 0, photo, torch.rand_like(photo))
+    assert torch.equal(model.encode(photo, iuv), model.encode(other, iuv))
+
+
+def test_same_seed_same_weights() -> None:
+    states = []
+    for _ in range(2):
+        torch.manual_seed(3)
+        states.append(small().state_dict())
+    assert all(torch.equal(states[0][key], states[1][key]) for key in states[0])
+
+
+class Render(nn.Module):
+    """`NeuralReRenderer.render` as a module, as export takes modules only."""
+
+    def __init__(self, model: NeuralReRenderer) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, feature_map: Tensor, target_iuv: Tensor) -> Tensor:
+        return self.model.render(feature_map, target_iuv)
+
+
+@pytest.mark.usefixtures("unchecked")
+@pytest.mark.parametrize("variant", ["full", "warp-cond"])
+def test_compiled_render_equals_eager(targets: Tensor, variant: str) -> None:
+    """In one graph. Code generation is left out: it is torch's own and takes half a minute."""
+    model = small(variant=variant)
+    feature_map = torch.rand(1, model.config.map_channels, 64, 64)
+    compiled = torch.compile(model.render, fullgraph=True, backend="aot_eager")
+    with torch.no_grad():
+        expected = model.render(feature_map, targets)
+        torch.testing.assert_close(compiled(feature_map, targets), expected, rtol=0, atol=1e-5)
+
+
+@pytest.mark.usefixtures("unchecked")
+@pytest.mark.filterwarnings("ignore:.isinstance.treespec, LeafSpec:FutureWarning")
+@pytest.mark.parametrize("variant", ["full", "warp-cond"])
+def test_onnx_export_of_render_equals_torch(targets: Tensor, variant: str, tmp_path: Path) -> None:
+    onnxruntime = pytest.importorskip("onnxruntime")
+    pytest.importorskip("onnxscript")
+    model = small(variant=variant, alpha=True)
+    feature_map = torch.rand(1, model.config.map_channels, 64, 64)
+    program = torch.onnx.export(
+        Render(model).eval(),
+        (feature_map, targets),
+        dynamo=True,
+        verbose=False,
+        input_names=["feature_map", "target_iuv"],
+    )
+    assert program is not None
+    path = tmp_path / "render.onnx"
+    program.save(path)
+    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    other = targets.flip(0)
+    inputs = {"feature_map": feature_map.numpy(), "target_iuv": other.numpy()}
+    (frames,) = session.run(None, inputs)
+    with torch.no_grad():
+        expected = model.render(feature_map, other)
+    torch.testing.assert_close(torch.from_numpy(frames), expected, rtol=0, atol=1e-4)

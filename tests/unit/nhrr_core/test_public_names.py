@@ -1,0 +1,69 @@
+"""The names others build on: removing or adding one has to be on purpose."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+import nhrr_core
+
+PUBLIC_NAMES = {
+    "PART_COUNT",
+    "PART_GROUPS",
+    "PART_NAMES",
+    "PRESETS",
+    "VARIANTS",
+    "ConfigError",
+    "FastRenderNet",
+    "FeatureNet",
+    "IuvError",
+    "ModelConfig",
+    "NeuralReRenderer",
+    "NhrrError",
+    "RenderNet",
+    "ShapeError",
+    "UVLayout",
+    "check_iuv",
+    "extract_texture",
+    "keep_parts",
+    "load_uv_layout",
+    "merge_textures",
+    "normalise_iuv",
+    "sample_features",
+    "texture_coordinates",
+}
+
+
+def test_names_are_exactly_these() -> None:
+    assert set(nhrr_core.__all__) == PUBLIC_NAMES
+    assert len(nhrr_core.__all__) == len(PUBLIC_NAMES)
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC_NAMES))
+def test_name_exists_and_is_documented(name: str) -> None:
+    value = getattr(nhrr_core, name)
+    if callable(value):
+        assert value.__doc__
+
+
+def test_errors_are_value_errors() -> None:
+    for error in (nhrr_core.ConfigError, nhrr_core.IuvError, nhrr_core.ShapeError):
+        assert issubclass(error, nhrr_core.NhrrError)
+    assert issubclass(nhrr_core.NhrrError, ValueError)
+
+
+def test_only_torch_jaxtyping_and_the_standard_library_are_imported() -> None:
+    allowed = {"nhrr_core", "torch", "jaxtyping"} | sys.stdlib_module_names
+    folder = Path(nhrr_core.__file__).parent
+    for file in sorted(folder.glob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                names = [node.module or ""]
+            else:
+                continue
+            assert {name.split(".")[0] for name in names} <= allowed, file.name

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import pytest
+import torch
+from reference.nhrr_core_loops import sample_features_loops
+from torch import Tensor
+
+from nhrr_core import ShapeError, sample_features
+
+
+@pytest.fixture
+def noise() -> Tensor:
+    """Two 7 x 6 images of all parts and background, with U and V at random."""
+    iuv = torch.randint(0, 256, (2, 3, 7, 6), dtype=torch.uint8)
+    iuv[:, 0] = torch.randint(0, 25, (2, 7, 6), dtype=torch.uint8)
+    return iuv
+
+
+def test_shape_and_type(noise: Tensor, charts: Tensor) -> None:
+    for dtype in (torch.float32, torch.float64):
+        image = sample_features(torch.rand(2, 5, 16, 16, dtype=dtype), noise, charts)
+        assert image.shape == (2, 5, 7, 6)
+        assert image.dtype == dtype
+
+
+@pytest.mark.parametrize("maps", [1, 2])
+@pytest.mark.parametrize("size", [1, 2, 9, 64])
+def test_equals_loops_in_values_and_gradients(
+    noise: Tensor, charts: Tensor, maps: int, size: int
+) -> None:
+    fast_map = torch.rand(maps, 3, size, size, dtype=torch.float64, requires_grad=True)
+    slow_map = fast_map.detach().clone().requires_grad_()
+    fast = sample_features(fast_map, noise, charts)
+    slow = sample_features_loops(slow_map, noise, charts)
+    # Places are float32 in the fast version: half a texel of 64 is known to about 1e-6.
+    torch.testing.assert_close(fast, slow, rtol=0, atol=1e-5)
+    weight = torch.rand_like(fast)
+    (fast * weight).sum().backward()
+    (slow * weight).sum().backward()
+    torch.testing.assert_close(fast_map.grad, slow_map.grad, rtol=0, atol=2e-5)
+
+
+def test_gradcheck(noise: Tensor, charts: Tensor) -> None:
+    feature_map = torch.rand(1, 2, 4, 4, dtype=torch.float64, requires_grad=True)
+    small = noise[:, :, :3, :3]
+    assert torch.autograd.gradcheck(lambda m: sample_features(m, small, charts), feature_map)
+
+
+def test_pixel_in_a_texel_centre_is_that_texel(plain_charts: Tensor) -> None:
+    feature_map = torch.rand(1, 4, 256, 256)
+    iuv = torch.randint(0, 256, (1, 3, 8, 8), dtype=torch.uint8)
+    iuv[:, 0] = 9
+    u, v = iuv[0, 1].long(), iuv[0, 2].long()
+    image = sample_features(feature_map, iuv, plain_charts)
+    torch.testing.assert_close(image[0], feature_map[0, :, v, u], rtol=0, atol=1e-4)
+
+
+def test_u_runs_along_columns_and_v_along_rows(plain_charts: Tensor) -> None:
+    columns = torch.arange(256.0).expand(1, 1, 256, 256)
+    iuv = torch.tensor([9, 30, 200], dtype=torch.uint8).view(1, 3, 1, 1)
+    along_u = sample_features(columns, iuv, plain_charts)
+    along_v = sample_features(columns.mT.contiguous(), iuv, plain_charts)
+    torch.testing.assert_close(along_u.item(), 30.0, rtol=0, atol=1e-3)
+    torch.testing.assert_close(along_v.item(), 200.0, rtol=0, atol=1e-3)
+
+
+def test_halfway_between_centres_is_the_mean(plain_charts: Tensor) -> None:
+    """A 128-texel map has its centres halfway between entries 0 and 1, 2 and 3 and so on."""
+    feature_map = torch.zeros(1, 1, 128, 128)
+    feature_map[..., 10] = 8.0
+    iuv = torch.zeros(1, 3, 1, 4, dtype=torch.uint8)
+    iuv[:, 0], iuv[:, 2] = 1, 100
+    iuv[0, 1, 0] = torch.tensor([19, 20, 21, 22])
+    image = sample_features(feature_map, iuv, plain_charts)
+    expected = torch.tensor([2.0, 6.0, 6.0, 2.0])
+    torch.testing.assert_close(image[0, 0, 0], expected, rtol=0, atol=1e-4)
+
+
+def test_constant_beyond_the_outermost_centres() -> None:
+    feature_map = torch.tensor([[1.0, 2.0], [3.0, 4.0]])[None, None]
+    charts = torch.zeros(24, 256, 256, 2)
+    charts[0, 0, 0], charts[0, 0, 1] = torch.tensor([0.0, 0.0]), torch.tensor([1.0, 1.0])
+    iuv = torch.tensor([[[1, 1]], [[0, 1]], [[0, 0]]], dtype=torch.uint8)[None]
+    assert sample_features(feature_map, iuv, charts).flatten().tolist() == [1.0, 4.0]
+
+
+@pytest.mark.parametrize("value", [1e38, -1e38, 1.0])
+def test_background_is_exactly_zero(noise: Tensor, charts: Tensor, value: float) -> None:
+    background = noise[:, :1] == 0
+    assert 0 < background.sum() < background.numel()
+    image = sample_features(torch.full((1, 2, 8, 8), value), noise, charts)
+    assert (image[background.expand_as(image)] == 0).all()
+    assert (image[~background.expand_as(image)] != 0).all()
+
+
+def test_background_passes_no_gradient(noise: Tensor, charts: Tensor) -> None:
+    noise[:, 0] = 0
+    feature_map = torch.rand(1, 2, 8, 8, requires_grad=True)
+    sample_features(feature_map, noise, charts).sum().backward()
+    assert feature_map.grad is not None
+    assert (feature_map.grad == 0).all()
+
+
+def test_gradient_counts_the_pixels_of_the_body(noise: Tensor, charts: Tensor) -> None:
+    feature_map = torch.rand(1, 1, 32, 32, requires_grad=True)
+    sample_features(feature_map, noise, charts).sum().backward()
+    assert feature_map.grad is not None
+    body = (noise[:, 0] > 0).sum().float()
+    torch.testing.assert_close(feature_map.grad.sum(), body)
+
+
+def test_one_map_serves_the_batch(noise: Tensor, charts: Tensor) -> None:
+    feature_map = torch.rand(1, 3, 16, 16)
+    shared = sample_features(feature_map, noise, charts)
+    assert torch.equal(shared, sample_features(feature_map.repeat(2, 1, 1, 1), noise, charts))
+
+
+def test_each_image_has_its_own_map(noise: Tensor, charts: Tensor) -> None:
+    maps = torch.rand(2, 3, 16, 16)
+    both = sample_features(maps, noise, charts)
+    for i in range(2):
+        alone = sample_features(maps[i : i + 1], noise[i : i + 1], charts)
+        torch.testing.assert_close(both[i : i + 1], alone, rtol=0, atol=1e-6)
+    assert not torch.equal(both, sample_features(maps.flip(0), noise, charts))
+
+
+@pytest.mark.usefixtures("unchecked")
+@pytest.mark.parametrize(("maps", "images"), [(3, 2), (2, 1), (0, 2)])
+def test_another_number_of_maps_raises(charts: Tensor, maps: int, images: int) -> None:
+    iuv = torch.zeros(images, 3, 4, 4, dtype=torch.uint8)
+    with pytest.raises(ShapeError) as raised:
+        sample_features(torch.rand(maps, 2, 8, 8), iuv, charts)
+    message = f"{maps} feature maps for {images} IUV images; give 1 or {images}"
+    assert str(raised.value) == message

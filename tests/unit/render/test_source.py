@@ -1,0 +1,194 @@
+"""The source: photo and IUV found, checked and unfolded, with garments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from motion_transfer.errors import InputError
+from motion_transfer.render.options import Garment, RenderOptions, parse_parts
+from motion_transfer.render.source import Source, prepare_source, trim_outline
+from nhrr_core import load_uv_layout
+
+SIZE = 64
+TORSO, HEAD = (2,), (23, 24)
+RED, GREEN, YELLOW = (200, 40, 40), (40, 160, 60), (220, 180, 40)
+
+
+def prepare(photo: Path, **changes) -> Source:
+    options = RenderOptions(source=photo, driver=Path("driver"), output=Path("out"), **changes)
+    return prepare_source(options, SIZE)
+
+
+def colour_of(source: Source, parts: tuple[int, ...]) -> list[int] | None:
+    """The median colour of some parts in the texture; None where only their border is seen."""
+    step = 256 // SIZE
+    texels = np.isin(load_uv_layout().part.numpy()[step // 2 :: step, step // 2 :: step], parts)
+    seen = texels & (source.visibility[0, 0].numpy() > 0)
+    if seen.sum() < 0.3 * texels.sum():
+        return None
+    colours = source.texture[0].permute(1, 2, 0).numpy()[seen]
+    return ((np.median(colours, axis=0) + 1) * 127.5).round().astype(int).tolist()
+
+
+@pytest.mark.parametrize("order", ["iuv", "vui"])
+def test_parts_take_their_colours_from_the_photo(studio, order: str) -> None:
+    source = prepare(studio.source(order=order))
+    assert colour_of(source, TORSO) == list(RED)
+    assert colour_of(source, HEAD) == list(YELLOW)
+    assert colour_of(source, (1,)) is None  # the back
+
+
+def test_an_outline_that_strays_is_trimmed(studio) -> None:
+    """The IUV reaches two pixels over the backdrop, which may not enter the texture."""
+    true = studio.iuv(scale=4, size=(384, 256))
+    photo = studio.dress(true)
+    rough = np.maximum(true, np.roll(true, 2, axis=1))
+    trimmed = trim_outline(photo, rough)[..., 0] > 0
+    person = true[..., 0] > 0
+    assert (trimmed & ~person).sum() < 0.01 * ((rough[..., 0] > 0) & ~person).sum()
+    assert trimmed.sum() > 0.9 * person.sum()
+
+
+@pytest.mark.parametrize("word", ["IUV", "iuv"])
+def test_the_iuv_is_found_beside_the_photo(studio, word: str) -> None:
+    photo = studio.source()
+    (studio.folder / "person_IUV.png").rename(studio.folder / f"person_{word}.png")
+    assert prepare(photo).iuv_path.name == f"person_{word}.png"
+
+
+def test_a_named_iuv_is_taken(studio) -> None:
+    photo = studio.source()
+    other = (studio.folder / "person_IUV.png").rename(studio.folder / "other.png")
+    assert prepare(photo, source_iuv=other).iuv_path == other
+    with pytest.raises(InputError, match=r"neither person_IUV\.png nor person_iuv\.png"):
+        prepare(photo)
+
+
+def test_a_turned_photo_matches_an_upright_iuv(studio) -> None:
+    upright = np.asarray(Image.open(studio.source()))
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(np.rot90(upright)).save(studio.folder / "person.png", exif=exif)
+    assert colour_of(prepare(studio.folder / "person.png"), TORSO) == list(RED)
+
+
+def test_an_iuv_of_the_unturned_photo_is_refused_with_a_hint(studio) -> None:
+    upright = np.asarray(Image.open(studio.source()))
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(np.rot90(upright)).save(studio.folder / "person.png", exif=exif)
+    iuv = np.asarray(Image.open(studio.folder / "person_IUV.png"))
+    studio.image("person_IUV.png", np.rot90(iuv))
+    with pytest.raises(InputError, match=r"is 192 x 128, but .* is 128 x 192; .*EXIF"):
+        prepare(studio.folder / "person.png")
+
+
+def test_an_iuv_of_another_size_is_refused(studio) -> None:
+    photo = studio.source()
+    studio.image("person_IUV.png", studio.iuv())
+    with pytest.raises(InputError, match=r"is 64 x 96, but .* is 128 x 192; make the IUV from"):
+        prepare(photo)
+
+
+def test_an_empty_iuv_is_refused(studio) -> None:
+    photo = studio.source()
+    studio.image("person_IUV.png", np.zeros((192, 128, 3), np.uint8))
+    with pytest.raises(InputError, match=r"person_IUV\.png: no person in it"):
+        prepare(photo)
+
+
+def test_too_little_body_is_refused(studio) -> None:
+    photo = studio.source()
+    iuv = studio.iuv(scale=2, size=(192, 128), parts=(2,))
+    iuv[..., 1:] //= 16  # a corner of the chest, large in the photo
+    studio.image("person_IUV.png", iuv)
+    with pytest.raises(InputError, match=r"too little of the body \(0\.\d% of the texture\)"):
+        prepare(photo, source_iuv_order="iuv")
+
+
+def test_transparent_pixels_are_left_out(studio) -> None:
+    photo = studio.source()
+    rgb = np.asarray(Image.open(photo))
+    iuv = np.asarray(Image.open(studio.folder / "person_IUV.png"))
+    alpha = np.where(np.isin(iuv[..., 0], HEAD), 0, 255).astype(np.uint8)
+    studio.image("person.png", np.concatenate([rgb, alpha[..., None]], 2))
+    source = prepare(photo)
+    assert colour_of(source, HEAD) is None
+    assert colour_of(source, TORSO) == list(RED)
+
+
+@pytest.mark.parametrize("depth", [np.uint8, np.uint16])
+def test_grey_photos_work(studio, depth: type) -> None:
+    photo = studio.source()
+    iuv = np.asarray(Image.open(studio.folder / "person_IUV.png"))
+    grey = np.where(iuv[..., 0] == 2, 0xC8, 0x20).astype(depth)
+    Image.fromarray(grey * (257 if depth is np.uint16 else 1)).save(photo)
+    assert colour_of(prepare(photo), TORSO) == [0xC8] * 3
+
+
+def pair(studio) -> np.ndarray:
+    """Two people side by side, in a photo and its IUV: red shirt left, green shirt right."""
+    left = studio.iuv(scale=2, size=(192, 128))
+    photos = [studio.dress(left), studio.dress(left, {TORSO: GREEN})]
+    studio.image("pair_IUV.png", np.hstack([left, left]))
+    studio.image("pair.png", np.hstack(photos))
+    return studio.folder / "pair.png"
+
+
+@pytest.mark.parametrize(("person", "shirt"), [("0", RED), ("1", GREEN), ("130,0,256,192", GREEN)])
+def test_one_of_several_people(studio, person: str, shirt: tuple) -> None:
+    assert colour_of(prepare(pair(studio), person=person), TORSO) == list(shirt)
+
+
+def garment(photo: Path, parts: str, iuv: Path | None = None) -> Garment:
+    return Garment(photo=photo, parts=parse_parts(parts), iuv=iuv)
+
+
+def test_a_garment_replaces_its_parts_only(studio) -> None:
+    shirt = studio.source("shirt", colours={TORSO: GREEN, HEAD: (0, 0, 0)})
+    source = prepare(studio.source(), garments=(garment(shirt, "torso"),))
+    assert colour_of(source, TORSO) == list(GREEN)
+    assert colour_of(source, HEAD) == list(YELLOW)
+
+
+def test_the_source_does_not_show_under_a_garment(studio) -> None:
+    """The garment photo shows one arm; the other arm must not keep the source's sleeve."""
+    sleeve = studio.source("sleeve", parts=(2, 15, 19), colours={(15, 19): (0, 0, 0)})
+    source = prepare(studio.source(), garments=(garment(sleeve, "upper-arms"),))
+    assert colour_of(source, (15,)) == [0, 0, 0]
+    assert colour_of(source, (16,)) is None
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_the_later_of_two_garments_wins(studio, swap: bool) -> None:
+    shirt = garment(studio.source("shirt", colours={TORSO: GREEN}), "torso,upper-legs")
+    jacket = garment(studio.source("jacket", colours={TORSO: YELLOW}), "torso")
+    pairs = (jacket, shirt) if swap else (shirt, jacket)
+    source = prepare(studio.source(), garments=pairs)
+    assert colour_of(source, TORSO) == list(GREEN if swap else YELLOW)
+
+
+def test_every_part_may_come_from_garments(studio) -> None:
+    everything = "torso,hands,feet,upper-legs,lower-legs,upper-arms,lower-arms,head"
+    other = studio.source("other", colours={TORSO: GREEN})
+    source = prepare(studio.source(), garments=(garment(other, everything),))
+    assert colour_of(source, TORSO) == list(GREEN)
+
+
+def test_a_garment_without_its_parts_says_what_it_shows(studio) -> None:
+    hat = studio.source("hat", parts=(23, 24))
+    with pytest.raises(InputError, match=r"hat\.png shows none of torso-back, torso-front; it sho"):
+        prepare(studio.source(), garments=(garment(hat, "torso"),))
+
+
+def test_a_garments_iuv_can_be_named(studio) -> None:
+    shirt = studio.source("shirt", colours={TORSO: GREEN})
+    iuv = (studio.folder / "shirt_IUV.png").rename(studio.folder / "elsewhere.png")
+    source = prepare(studio.source(), garments=(garment(shirt, "torso", iuv),))
+    assert colour_of(source, TORSO) == list(GREEN)
+    with pytest.raises(InputError, match=r"no IUV found for .*shirt"):
+        prepare(studio.source(), garments=(garment(shirt, "torso"),))

@@ -1,0 +1,79 @@
+"""The crop window: cut, and paste back where it was."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from motion_transfer.render.compose import paste
+from motion_transfer.render.person import Person, find_people
+from motion_transfer.render.window import Window, plan_window
+
+INSIDE = Window(10, 20, 30)
+BEYOND = [Window(-10, -5, 40), Window(40, 70, 50), Window(-30, -20, 140)]
+
+
+@pytest.mark.parametrize("window", [INSIDE, *BEYOND])
+def test_cut_then_paste_puts_every_pixel_back(studio, window: Window) -> None:
+    iuv = studio.iuv()
+    crop = window.cut(iuv, window.side)
+    frame = np.full_like(iuv, 99)
+    coverage = np.full((window.side, window.side, 1), 255, np.uint8)
+    paste(frame, np.concatenate([crop, coverage], 2), window)
+    inside = np.zeros(iuv.shape[:2], bool)
+    inside[max(window.y, 0) : window.y + window.side, max(window.x, 0) : window.x + window.side] = 1
+    np.testing.assert_array_equal(frame[inside], iuv[inside])
+    assert (frame[~inside] == 99).all()
+
+
+@pytest.mark.parametrize("window", BEYOND)
+def test_beyond_the_frame_is_background(studio, window: Window) -> None:
+    crop = window.cut(np.full((96, 64, 3), 7, np.uint8), window.side)
+    rows = (np.arange(window.side) + window.y >= 0) & (np.arange(window.side) + window.y < 96)
+    columns = (np.arange(window.side) + window.x >= 0) & (np.arange(window.side) + window.x < 64)
+    np.testing.assert_array_equal(crop[..., 0] > 0, rows[:, None] & columns)
+
+
+@pytest.mark.parametrize("size", [17, 64, 200])
+@pytest.mark.parametrize("window", [INSIDE, *BEYOND])
+def test_no_pixel_appears_that_was_not_there(studio, window: Window, size: int) -> None:
+    iuv = studio.iuv()
+    crop = window.cut(iuv, size)
+    assert crop.shape == (size, size, 3)
+    before = {tuple(pixel) for pixel in iuv.reshape(-1, 3).tolist()} | {(0, 0, 0)}
+    assert {tuple(pixel) for pixel in crop.reshape(-1, 3).tolist()} <= before
+
+
+def test_partial_coverage_blends() -> None:
+    frame = np.full((16, 16, 3), 100, np.uint8)
+    rgba = np.full((16, 16, 4), 200, np.uint8)
+    rgba[:, :8, 3], rgba[:, 8:, 3] = 0, 51
+    paste(frame, rgba, Window(0, 0, 16))
+    assert (frame[:, :8] == 100).all()
+    assert (frame[:, 8:] == 120).all()
+
+
+@pytest.mark.parametrize("size", [8, 32])
+def test_a_crop_of_another_size_is_scaled(size: int) -> None:
+    frame = np.zeros((20, 20, 3), np.uint8)
+    paste(frame, np.full((size, size, 4), 255, np.uint8), Window(2, 4, 16))
+    expected = np.zeros_like(frame)
+    expected[4:20, 2:18] = 255
+    np.testing.assert_array_equal(frame, expected)
+
+
+def test_the_window_holds_the_whole_path(studio) -> None:
+    path = [find_people(frame).persons[0] for frame in studio.walk(15)]
+    window = plan_window([*path, None])
+    assert window.side % 2 == 0
+    for person in path:
+        assert window.x < person.x0
+        assert person.x1 < window.x + window.side
+        assert window.y < person.y0
+        assert person.y1 < window.y + window.side
+
+
+def test_a_speck_gets_a_window_that_codecs_take() -> None:
+    window = plan_window([Person(50, 50, 52, 53, 6, (1,))])
+    assert window.side == 16
+    assert window.x <= 50 < 53 <= window.x + 16
