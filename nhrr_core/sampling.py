@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import torch
 import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor
@@ -38,4 +39,4 @@ def sample_features(
         padding_mode="border",
         align_corners=False,
     )
-    return sampled * (iuv[:, :1] > 0)
+    return torch.where(iuv[:, :1] > 0, sampled, 0)

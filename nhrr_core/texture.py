@@ -13,8 +13,8 @@ from nhrr_core.uv_layout import CHART_SIZE, chart_index, texture_coordinates
 MAX_CHART_STEP = 0.15
 """Neighbouring pixels whose U or V differ by more lie on separate pieces of the surface."""
 
-MAX_STRETCH_TEXELS = 16
-"""So do neighbours that land further apart in the texture."""
+MAX_STRETCH = 1 / 16
+"""So do neighbours that land further apart in the texture, as a share of its side."""
 
 SAMPLES_PER_TEXEL = 3.0
 """Density of the points that fill between pixels, so that none is missed where charts bend."""
@@ -112,17 +112,17 @@ def _quads_by_steps(
     part, u, v = (_corners(channel) for channel in iuv.int().unbind(1))
     step = torch.maximum(u.amax(0) - u.amin(0), v.amax(0) - v.amin(0))
     corners = _corners(place)
-    stretch = (corners.amax(0) - corners.amin(0)).amax(-1) * size
+    stretch = (corners.amax(0) - corners.amin(0)).amax(-1)
     joined = (part[0] > 0) & (part == part[0]).all(0)
-    joined &= (step <= MAX_CHART_STEP * 255) & (stretch <= MAX_STRETCH_TEXELS)
-    wanted = stretch * SAMPLES_PER_TEXEL
+    joined &= (step <= MAX_CHART_STEP * 255) & (stretch <= MAX_STRETCH)
+    wanted = stretch * size * SAMPLES_PER_TEXEL
     quad = torch.arange(part[0].numel(), device=iuv.device).view_as(part[0])
-    groups, low = [], SAMPLES_PER_TEXEL  # at most one texel apart: no texel lies between
-    for steps in (4, 8, 16, 32, 64):
+    groups, low, steps = [], SAMPLES_PER_TEXEL, 4  # under one texel apart: none lies between
+    while low < MAX_STRETCH * size * SAMPLES_PER_TEXEL:
         chosen = joined & (wanted > low) & (wanted <= steps)
-        low = max(low, steps)
         if chosen.any():
             groups.append((steps, quad, chosen))
+        low, steps = steps, steps * 2
     return groups
 
 
@@ -136,12 +136,13 @@ def _fill_points(
     size: int,
 ) -> tuple[Float[Tensor, "N C"], Int64[Tensor, " N"]]:
     """Colours and texels of steps x steps points spread evenly inside each chosen quad."""
-    line = (torch.arange(steps, device=iuv.device, dtype=colours.dtype) + 0.5) / steps
+    precise = torch.promote_types(colours.dtype, torch.float32)
+    line = (torch.arange(steps, device=iuv.device, dtype=precise) + 0.5) / steps
     y, x = (axis.reshape(-1) for axis in torch.meshgrid(line, line, indexing="ij"))
     weights = torch.stack([(1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x])
 
-    values = torch.einsum("kp,kqc->qpc", weights, _corners(colours)[:, chosen])
-    chart_uv = _corners(iuv[:, 1:].permute(0, 2, 3, 1).to(colours.dtype))[:, chosen]
+    values = torch.einsum("kp,kqc->qpc", weights.to(colours.dtype), _corners(colours)[:, chosen])
+    chart_uv = _corners(iuv[:, 1:].permute(0, 2, 3, 1).to(precise))[:, chosen]
     between = torch.einsum("kp,kqc->qpc", weights, chart_uv)
     part = iuv[:, 0, :-1, :-1][chosen].long()[:, None].expand(between.shape[:-1])
     place = _place_between_entries(charts, part, between)
@@ -152,7 +153,7 @@ def _fill_points(
 def _place_between_entries(
     charts: Float[Tensor, "24 256 256 2"], part: Int64[Tensor, "Q P"], uv: Float[Tensor, "Q P 2"]
 ) -> Float[Tensor, "Q P 2"]:
-    """Texture coordinates of fractional (U, V), bilinear in the table; across a seam, the nearest."""
+    """Texture coordinates of fractional (U, V): bilinear in the table, nearest across a seam."""
     low = uv.floor().clamp(0, CHART_SIZE - 2)
     (right, down), (u, v) = (uv - low).unbind(-1), low.long().unbind(-1)
     table = charts.view(-1, 2)

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 MAX_CHART_STEP = 0.15 * 255
-MAX_STRETCH_TEXELS = 16
+MAX_STRETCH = 1 / 16
 SAMPLES_PER_TEXEL = 3.0
 MAX_ENTRY_STEP = 0.03
 
@@ -81,11 +81,11 @@ def _points_of_quad(
     if max(us) - min(us) > MAX_CHART_STEP or max(vs) - min(vs) > MAX_CHART_STEP:
         return []
     places = [_place(charts, *corner) for corner in zip(parts, us, vs, strict=True)]
-    stretch = size * max(max(axis) - min(axis) for axis in zip(*places, strict=True))
-    if stretch > MAX_STRETCH_TEXELS or stretch <= 1:
+    stretch = max(max(axis) - min(axis) for axis in zip(*places, strict=True))
+    if stretch > MAX_STRETCH or stretch * size <= 1:
         return []
     steps = 4
-    while steps < stretch * SAMPLES_PER_TEXEL:
+    while steps < stretch * size * SAMPLES_PER_TEXEL:
         steps *= 2
     points = []
     for i in range(steps):

@@ -193,10 +193,10 @@ def test_filling_is_bilinear(plain_charts: Tensor) -> None:
 def test_big_jumps_in_u_or_v_are_not_joined(
     plain_charts: Tensor, step: int, joined: bool, axis: str
 ) -> None:
-    """0.15 of the chart is 38.25 entries; they are 9.5 texels of a 64 x 64 texture."""
+    """0.15 of the chart is 38.25 entries; here they are less than 1/16 of the texture."""
     u, v = (100 + step, 108) if axis == "u" else (108, 100 + step)
     iuv = pixels([[(1, 100, 100), (1, u, 100)], [(1, 100, v), (1, u, v)]])
-    _, visibility = extract_texture(torch.rand(1, 3, 2, 2), iuv, plain_charts, 64)
+    _, visibility = extract_texture(torch.rand(1, 3, 2, 2), iuv, plain_charts / 4, 256)
     assert (visibility.sum() > 4).item() is joined
 
 
@@ -403,3 +403,32 @@ def test_split_by_part_and_merged_is_the_whole(charts: Tensor, ramp) -> None:
     ]
     for merged, expected in zip(merge_textures(layers), whole, strict=True):
         torch.testing.assert_close(merged, expected, rtol=0, atol=1e-6)
+
+
+def test_coarse_photo_leaves_no_sieve_at_any_texture_size(charts: Tensor, ramp) -> None:
+    """What counts as too far apart is a share of the texture, not a number of texels."""
+    visibility = extract_texture(torch.rand(1, 1, 12, 12), ramp(2, 12), charts, 1024)[1][0, 0]
+    region = between_centres(charts, 2, 60, 190, 1024)
+    assert (strictly_inside(region) & (visibility == 0)).sum() < 0.01 * region.sum()
+
+
+def test_half_precision_photo_lands_on_the_same_texels(charts: Tensor, ramp) -> None:
+    image = torch.rand(1, 3, 25, 25)
+    seen = [
+        extract_texture(image.to(t), ramp(2, 25), charts, 256)[1] for t in (torch.half, torch.float)
+    ]
+    assert torch.equal(seen[0].float(), seen[1])
+
+
+@pytest.mark.parametrize(("gap", "filled"), [(0.02, True), (0.04, False)])
+def test_nothing_is_filled_across_a_texture_seam(
+    plain_charts: Tensor, gap: float, filled: bool
+) -> None:
+    """Two halves of a chart that lie apart in the texture: the gutter between them stays empty."""
+    charts = plain_charts * torch.tensor([0.5, 1.0])
+    charts[:, :, 100:, 0] += gap
+    iuv = pixels([[(1, 98, 90), (1, 101, 90)], [(1, 98, 93), (1, 101, 93)]])
+    visibility = extract_texture(torch.rand(1, 1, 2, 2), iuv, charts, 256)[1][0, 0]
+    left, right = int(charts[0, 91, 99, 0] * 256), int(charts[0, 91, 100, 0] * 256)
+    assert right - left > 3
+    assert bool((visibility[91, left + 1 : right] > 0).all()) is filled

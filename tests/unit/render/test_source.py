@@ -155,10 +155,14 @@ def test_a_garment_replaces_its_parts_only(studio) -> None:
     assert colour_of(source, HEAD) == list(YELLOW)
 
 
-def test_the_source_does_not_show_under_a_garment(studio) -> None:
-    """The garment photo shows one arm; the other arm must not keep the source's sleeve."""
+@pytest.mark.parametrize("covered", [False, True])
+def test_nothing_shows_under_a_garment(studio, covered: bool) -> None:
+    """Its photo shows one arm; the other must not keep the sleeve of source or earlier garment."""
     sleeve = studio.source("sleeve", parts=(2, 15, 19), colours={(15, 19): (0, 0, 0)})
-    source = prepare(studio.source(), garments=(garment(sleeve, "upper-arms"),))
+    garments = [garment(sleeve, "upper-arms")]
+    if covered:
+        garments.insert(0, garment(studio.source("shirt"), "torso,upper-arms"))
+    source = prepare(studio.source(), garments=tuple(garments))
     assert colour_of(source, (15,)) == [0, 0, 0]
     assert colour_of(source, (16,)) is None
 
