@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +64,12 @@ def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> N
 
     reader = open_reader(open_stream(driver))
     plan = plan_driver(
-        reader, frames=(None, None), frame_rate=30, person="largest", workers=2, done=ignore
+        reader,
+        frames=(None, None),
+        frame_rate=Fraction(30),
+        person="largest",
+        workers=2,
+        done=ignore,
     )
     crops = np.stack([plan.window.cut(iuv, 256) for iuv in reader.read(0, renderer.batch_size)])
     background = np.full((reader.height, reader.width, 3), 255, np.uint8)

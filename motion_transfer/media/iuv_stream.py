@@ -11,18 +11,13 @@ import shutil
 import tempfile
 import zipfile
 import zlib
-from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator
-from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-import av
 import numpy as np
-from av.container import InputContainer
-from av.error import FFmpegError
 
 from motion_transfer.errors import InputError, IuvFileError
 from motion_transfer.media.iuv_image import (
@@ -34,31 +29,10 @@ from motion_transfer.media.iuv_image import (
     read_raw_iuv,
     to_iuv,
 )
+from motion_transfer.media.iuv_video import VideoStream
+from motion_transfer.media.stream import IuvStream
 
-LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
-LOSSLESS_REMEDY = (
-    "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt bgr0 out.mkv`"
-)
 Missing = Literal["fail", "hold"]
-
-
-class IuvStream(ABC):
-    """Frames in the file's own channel order; `IuvReader` turns them to (I, U, V)."""
-
-    def __init__(self, path: Path, kind: str, frame_count: int) -> None:
-        self.path = path
-        self.kind = kind
-        self.frame_count = frame_count
-        self.frame_rate: Fraction | None = None
-        self.gaps: tuple[int, ...] = ()
-
-    @abstractmethod
-    def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
-        """Frames start..stop-1 in order. Raises: IuvFileError naming the frame that is broken."""
-
-    @abstractmethod
-    def where(self, index: int) -> str:
-        """The place of a frame, for messages."""
 
 
 class ImageStream(IuvStream):
@@ -76,60 +50,6 @@ class ImageStream(IuvStream):
 
     def where(self, index: int) -> str:
         return f"frame {index}, {self.files[index]}"
-
-
-class VideoStream(IuvStream):
-    """A lossless RGB video. Raises: IuvFileError for a lossy codec or a YUV pixel format."""
-
-    def __init__(self, path: Path) -> None:
-        try:
-            with av.open(str(path)) as container:
-                if not container.streams.video:
-                    raise IuvFileError(f"driver {path} has no video in it")
-                stream = container.streams.video[0]
-                codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
-                _check_lossless(path, codec, pixels)
-                times = sorted(
-                    (packet.pts, packet.duration or 0)
-                    for packet in container.demux(stream)
-                    if packet.pts is not None
-                )
-                self._timestamps = [pts for pts, _ in times]
-                rate = stream.average_rate or stream.guessed_rate
-                if times and rate and stream.time_base:
-                    _check_whole(path, container, sum(times[-1]) * stream.time_base, 1 / rate)
-        except FFmpegError as error:
-            raise IuvFileError(
-                f"driver {path} is not a readable video: {error.strerror}"
-            ) from error
-        if not self._timestamps:
-            raise IuvFileError(f"driver {path} holds no frames")
-        super().__init__(path, f"IUV video ({codec}, {pixels})", len(self._timestamps))
-        self.frame_rate = Fraction(rate) if rate else None
-
-    def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
-        index = start
-        try:
-            with av.open(str(self.path)) as container:
-                stream = container.streams.video[0]
-                container.seek(self._timestamps[start], stream=stream, backward=True)
-                for frame in container.decode(stream):
-                    if frame.pts is None or frame.pts < self._timestamps[index]:
-                        continue
-                    if frame.pts > self._timestamps[index]:
-                        break
-                    yield frame.to_ndarray(format="rgb24")
-                    index += 1
-                    if index == stop:
-                        return
-        except FFmpegError as error:
-            raise IuvFileError(
-                f"{self.where(index)} cannot be decoded: {error.strerror}"
-            ) from error
-        raise IuvFileError(f"{self.where(index)} cannot be decoded; export the driver again")
-
-    def where(self, index: int) -> str:
-        return f"frame {index} of {self.path}"
 
 
 class ArrayStream(IuvStream):
@@ -264,31 +184,6 @@ def _find_gaps(files: list[Path]) -> tuple[list[Path], tuple[int, ...]]:
         gaps += between
         held += [held[-1]] * len(between) + [file]
     return held, tuple(gaps)
-
-
-def _check_lossless(path: Path, codec: str, pixels: str) -> None:
-    if codec not in LOSSLESS_CODECS:
-        raise IuvFileError(
-            f"driver {path} is compressed with {codec}, which destroys part indices;"
-            f" {LOSSLESS_REMEDY}"
-        )
-    if not any(mark in pixels for mark in ("rgb", "bgr", "gbr")):
-        raise IuvFileError(
-            f"driver {path} stores {pixels} pixels, and the conversion to them already destroyed"
-            f" part indices; {LOSSLESS_REMEDY}"
-        )
-
-
-def _check_whole(
-    path: Path, container: InputContainer, end_seconds: Fraction, frame_seconds: Fraction
-) -> None:
-    """Compare where packets end with the length in the header: Matroska breaks off silently."""
-    promised_seconds = Fraction(container.duration or 0, av.time_base)
-    if len(container.streams) == 1 and promised_seconds > end_seconds + frame_seconds / 2:
-        raise IuvFileError(
-            f"driver {path} is truncated: it should last {float(promised_seconds):.2f} s, but ends"
-            f" after {float(end_seconds):.2f} s; export it again"
-        )
 
 
 def _map_array(path: Path) -> np.ndarray:

@@ -127,7 +127,7 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
 def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, DriverPlan]:
     stream = open_stream(options.driver, missing=options.missing)
     if stream.gaps:
-        listener(Notice(f"{len(stream.gaps)} missing frames repeat the frame before them"))
+        listener(Notice(f"missing and held from the frame before: {len(stream.gaps)} frames"))
     reader = open_reader(stream, options.iuv_order)
     chosen = frame_range(options.frames, stream.frame_count, str(options.driver))
     listener(Stage("scan", len(chosen)))

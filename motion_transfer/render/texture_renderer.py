@@ -59,4 +59,4 @@ def soften(mask: UInt8[np.ndarray, "S S"]) -> UInt8[np.ndarray, "S S"]:
     """Fade a 0/255 mask inwards: colours outside it are not known, so nothing may grow."""
     width = max(1, round(mask.shape[0] * EDGE_BLUR_SHARE)) * 2 + 1
     blurred = cv2.blur(mask, (width, width))
-    return cv2.addWeighted(blurred, 2, blurred, 0, -255)
+    return cv2.min(cv2.addWeighted(blurred, 2, blurred, 0, -255), mask)

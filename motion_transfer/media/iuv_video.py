@@ -1,0 +1,124 @@
+"""IUV in a lossless video."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import av.logging
+from av.container import InputContainer
+from av.error import FFmpegError
+
+from motion_transfer.errors import IuvFileError
+from motion_transfer.media.iuv_image import Raw
+from motion_transfer.media.stream import IuvStream
+
+LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
+LOSSLESS_REMEDY = (
+    "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt bgr0 out.mkv`"
+)
+
+# A decoder that meets damage conceals it, returns wrong pixels and only logs an error. Errors have
+# to reach Python for `_decode_intact` to hear of them, and nobody else needs to.
+av.logging.set_level(av.logging.ERROR)
+logging.getLogger("libav").addHandler(logging.NullHandler())
+
+
+class VideoStream(IuvStream):
+    """A lossless RGB video. Raises: IuvFileError for a lossy codec or a YUV pixel format."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            with av.open(str(path)) as container:
+                if not container.streams.video:
+                    raise IuvFileError(f"driver {path} has no video in it")
+                stream = container.streams.video[0]
+                codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
+                _check_lossless(path, codec, pixels)
+                times = sorted(
+                    (packet.pts, packet.duration or 0)
+                    for packet in container.demux(stream)
+                    if packet.pts is not None
+                )
+                self._timestamps = [pts for pts, _ in times]
+                rate = stream.average_rate or stream.guessed_rate
+                if times and rate and stream.time_base:
+                    _check_whole(path, container, sum(times[-1]) * stream.time_base, 1 / rate)
+        except FFmpegError as error:
+            raise IuvFileError(
+                f"driver {path} is not a readable video: {error.strerror}"
+            ) from error
+        if not self._timestamps:
+            raise IuvFileError(f"driver {path} holds no frames")
+        super().__init__(path, f"IUV video ({codec}, {pixels})", len(self._timestamps))
+        self.frame_rate = Fraction(rate) if rate else None
+
+    def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
+        index = start
+        try:
+            with av.open(str(self.path)) as container:
+                stream = container.streams.video[0]
+                stream.codec_context.thread_count = 1  # chunks are read in parallel already
+                container.seek(self._timestamps[start], stream=stream, backward=True)
+                for frame in _decode_intact(container, stream):
+                    if frame.pts is None or frame.pts < self._timestamps[index]:
+                        continue
+                    if frame.pts > self._timestamps[index]:
+                        break
+                    yield frame.to_ndarray(format="rgb24")
+                    index += 1
+                    if index == stop:
+                        return
+        except (FFmpegError, _DamagedError) as error:
+            raise IuvFileError(
+                f"{self.where(index)} is damaged ({error}); export it again"
+            ) from error
+        raise IuvFileError(f"{self.where(index)} cannot be decoded; export the driver again")
+
+    def where(self, index: int) -> str:
+        return f"frame {index} of {self.path}"
+
+
+class _DamagedError(Exception):
+    """A decoder complained about a frame."""
+
+
+def _decode_intact(container: InputContainer, stream: av.VideoStream) -> Iterator[av.VideoFrame]:
+    """Frames, as long as the decoder has nothing to complain about; in this thread only."""
+    frames = container.decode(stream)
+    while True:
+        with av.logging.Capture() as complaints:
+            frame = next(frames, None)
+        if complaints:
+            raise _DamagedError(complaints[0][2].strip())
+        if frame is None:
+            return
+        yield frame
+
+
+def _check_lossless(path: Path, codec: str, pixels: str) -> None:
+    if codec not in LOSSLESS_CODECS:
+        raise IuvFileError(
+            f"driver {path} is compressed with {codec}, which destroys part indices;"
+            f" {LOSSLESS_REMEDY}"
+        )
+    if not any(mark in pixels for mark in ("rgb", "bgr", "gbr")):
+        raise IuvFileError(
+            f"driver {path} stores {pixels} pixels, and the conversion to them already destroyed"
+            f" part indices; {LOSSLESS_REMEDY}"
+        )
+
+
+def _check_whole(
+    path: Path, container: InputContainer, end_seconds: Fraction, frame_seconds: Fraction
+) -> None:
+    """Compare where packets end with the length in the header: Matroska breaks off silently."""
+    promised_seconds = Fraction(container.duration or 0, av.time_base)
+    if len(container.streams) == 1 and promised_seconds > end_seconds + frame_seconds / 2:
+        raise IuvFileError(
+            f"driver {path} is truncated: it should last {float(promised_seconds):.2f} s, but ends"
+            f" after {float(end_seconds):.2f} s; export it again"
+        )
