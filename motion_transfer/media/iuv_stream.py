@@ -137,6 +137,12 @@ def open_reader(stream: IuvStream, order: ChannelOrder | None = None) -> IuvRead
     return IuvReader(stream, order, height, width)
 
 
+def list_gaps(gaps: tuple[int, ...]) -> str:
+    """Missing numbers in words, the first few of them listed."""
+    listed = ", ".join(map(str, gaps[:5])) + (", ..." if len(gaps) > 5 else "")
+    return f"{len(gaps)} missing frame{'s' if len(gaps) > 1 else ''} ({listed})"
+
+
 def natural_key(name: str) -> list[tuple[int, int | str]]:
     """A sort key that puts frame_9 before frame_10."""
     return [(0, int(s)) if s.isdigit() else (1, s) for s in re.findall(r"\d+|\D+", name)]
@@ -157,10 +163,9 @@ def _open_folder(path: Path, missing: Missing) -> ImageStream:
         raise InputError(f"driver {path} holds no IUV images ({', '.join(IUV_SUFFIXES)})")
     held, gaps = _find_gaps(files)
     if gaps and missing == "fail":
-        listed = ", ".join(map(str, gaps[:5])) + (", ..." if len(gaps) > 5 else "")
         raise InputError(
-            f"driver {path}: {len(gaps)} frame number{'s' if len(gaps) > 1 else ''} missing"
-            f" ({listed}); add the files, or repeat the frame before with --missing hold"
+            f"driver {path}: {list_gaps(gaps)}; add the files, or repeat the frame before with"
+            " --missing hold"
         )
     return ImageStream(path, held, gaps)
 

@@ -73,8 +73,9 @@ class VideoStream(IuvStream):
                     if index == stop:
                         return
         except (FFmpegError, _DamagedError) as error:
+            reason = error.strerror if isinstance(error, FFmpegError) else error
             raise IuvFileError(
-                f"{self.where(index)} is damaged ({error}); export it again"
+                f"{self.where(index)} is damaged ({reason}); export it again"
             ) from error
         raise IuvFileError(f"{self.where(index)} cannot be decoded; export the driver again")
 

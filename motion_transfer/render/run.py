@@ -12,7 +12,7 @@ from pathlib import Path
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.formats import OutputFormat, choose_format
 from motion_transfer.media.image import write_png
-from motion_transfer.media.iuv_stream import IuvReader, open_reader, open_stream
+from motion_transfer.media.iuv_stream import IuvReader, list_gaps, open_reader, open_stream
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.render.compose import Comparison, make_background
 from motion_transfer.render.engine import Canvas, Engine
@@ -127,7 +127,7 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
 def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, DriverPlan]:
     stream = open_stream(options.driver, missing=options.missing)
     if stream.gaps:
-        listener(Notice(f"missing and held from the frame before: {len(stream.gaps)} frames"))
+        listener(Notice(f"{list_gaps(stream.gaps)}; each repeats the frame before it"))
     reader = open_reader(stream, options.iuv_order)
     chosen = frame_range(options.frames, stream.frame_count, str(options.driver))
     listener(Stage("scan", len(chosen)))

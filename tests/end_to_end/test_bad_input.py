@@ -117,7 +117,7 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
         lambda s: s.image("driver/frame_2_IUV.png", s.iuv(size=(90, 60))),
         "frame 2, .*is 60 x 90, but the driver began with 64 x 96",
     ),
-    "frame missing": (lambda s: frame(s).unlink(), r"1 frame number missing \(2\)"),
+    "frame missing": (lambda s: frame(s).unlink(), r"1 missing frame \(2\)"),
     "first frame empty": (lambda s: blank(s, [0]), "no person in the first frame; .*--frames 1:5"),
     "every frame empty": (lambda s: blank(s, range(FRAMES)), "no person in any frame"),
     "order ambiguous": (
