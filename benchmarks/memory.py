@@ -2,7 +2,8 @@
 
     python benchmarks/memory.py [--frames 300 3000] [--weights FILE]
 
-Prints the peak resident size of each and their ratio: it should be near 1.
+Prints medians of the peak resident size and their ratio: it should be near 1. Single runs spread by
+a tenth and more, because threads share memory out differently each time.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import resource
+import statistics
 import tempfile
 from pathlib import Path
 
@@ -27,18 +29,23 @@ def peak_mib(driver: Path, output: Path, weights: Path | None) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, nargs=2, default=(300, 3000))
+    parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--weights", type=Path, help="measure nhrr instead of texture")
     arguments = parser.parse_args()
-    peaks = []
+    peaks: dict[int, list[float]] = {count: [] for count in arguments.frames}
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        for frame_count in arguments.frames:
-            driver = driver_folder(folder, frame_count)
-            job = (driver, folder / f"{frame_count}.mp4", arguments.weights)
-            with multiprocessing.get_context("spawn").Pool(1) as pool:
-                peaks.append(pool.apply(peak_mib, job))
-            print(f"{frame_count} frames: peak {peaks[-1]:.0f} MiB", flush=True)
-    print(f"ratio: {peaks[1] / peaks[0]:.3f}")
+        for index in range(arguments.rounds):
+            for count in arguments.frames:
+                output = folder / f"{count}_{index}.mp4"
+                job = (driver_folder(folder, count), output, arguments.weights)
+                with multiprocessing.get_context("spawn").Pool(1) as pool:
+                    peaks[count].append(pool.apply(peak_mib, job))
+    medians = [statistics.median(peaks[count]) for count in arguments.frames]
+    for count, median in zip(arguments.frames, medians, strict=True):
+        spread = f"{min(peaks[count]):.0f} to {max(peaks[count]):.0f}"
+        print(f"{count} frames: peak, median of {arguments.rounds}: {median:.0f} MiB ({spread})")
+    print(f"ratio: {medians[1] / medians[0]:.3f}")
 
 
 if __name__ == "__main__":
