@@ -12,6 +12,7 @@ Prints medians and ratios of one run:
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import subprocess
 import sys
@@ -19,6 +20,8 @@ import tempfile
 import time
 from fractions import Fraction
 from pathlib import Path
+
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, before torch
 
 import numpy as np
 from workload import SOURCE, driver_folder, random_checkpoint

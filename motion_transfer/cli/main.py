@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from importlib import import_module
@@ -56,6 +57,9 @@ class Terminated(BaseException):
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; every failure becomes one line on stderr and an exit code."""
     signal.signal(signal.SIGTERM, _terminate)
+    # torch's threads would spin while they wait, and take the cores from decoding and encoding;
+    # read when torch is first imported, which no command has done yet
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
         cli.main(args=arguments, prog_name="mt", standalone_mode=False)
     except click.ClickException as error:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
-from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -81,7 +80,7 @@ class Engine:
         self._workers = workers
         self._sheet = sheet
         self._listener = listener
-        self._turn = threading.Lock() if renderer.takes_turns else nullcontext()
+        self._draw = renderer.render
         self._stop = threading.Event()
 
     def run(self, folder: Path, destination: Path) -> None:
@@ -89,7 +88,14 @@ class Engine:
 
         Raises: the first worker's error, after all workers have stopped.
         """
-        with ThreadPoolExecutor(self._workers, thread_name_prefix="chunk") as pool:
+        with (
+            ThreadPoolExecutor(1, thread_name_prefix="renderer") as turns,
+            ThreadPoolExecutor(self._workers, thread_name_prefix="chunk") as pool,
+        ):
+            if self._renderer.takes_turns:
+                # one thread, not a lock: torch keeps a team of threads for each one that calls it,
+                # and teams that wait for work take the cores from the one that has some
+                self._draw = lambda crops: turns.submit(self._renderer.render, crops).result()
             futures = [
                 pool.submit(self._render_chunk, chunk, folder) for chunk in self._plan.chunks
             ]
@@ -141,8 +147,7 @@ class Engine:
             for slot, iuv in enumerate(batch):
                 crops[slot] = window.cut(iuv, size)
             try:
-                with self._turn:
-                    results = self._renderer.render(crops)
+                results = self._draw(crops)
             except (RuntimeError, MemoryError) as error:  # what torch raises, out of memory too
                 first = self._plan.first + chunk.start
                 raise RenderError(
