@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import torch
-from jaxtyping import Bool, Float, Int64, UInt8
+from jaxtyping import Float, Int64, UInt8
 from torch import Tensor
 
 from nhrr_core.errors import ShapeError
@@ -54,8 +54,8 @@ def extract_texture(
     seen = iuv[:, 0] > 0
     total, count = _scatter(colours[seen], _texel(place, batch, size)[seen], texels)
     fill_total, fill_count = torch.zeros_like(total), torch.zeros_like(count)
-    for steps, quad, chosen in _quads_by_steps(iuv, place, size):
-        points, texel = _fill_points(colours, iuv, charts, quad, chosen, steps, size)
+    for steps, quads in _quads_by_steps(iuv, place, size):
+        points, texel = _fill_points(colours, iuv, charts, quads, steps, size)
         more_total, more_count = _scatter(points, texel, texels)
         fill_total, fill_count = fill_total + more_total, fill_count + more_count
 
@@ -107,8 +107,8 @@ def _corners(x: Tensor) -> Tensor:
 
 def _quads_by_steps(
     iuv: UInt8[Tensor, "B 3 H W"], place: Float[Tensor, "B H W 2"], size: int
-) -> list[tuple[int, Int64[Tensor, "B Hq Wq"], Bool[Tensor, "B Hq Wq"]]]:
-    """Quads that need filling, grouped by the number of points along a side (a power of two)."""
+) -> list[tuple[int, Int64[Tensor, "Q 3"]]]:
+    """Quads to fill, as (image, row, column) of their first corner, by points along a side."""
     part, u, v = (_corners(channel) for channel in iuv.int().unbind(1))
     step = torch.maximum(u.amax(0) - u.amin(0), v.amax(0) - v.amin(0))
     corners = _corners(place)
@@ -116,12 +116,11 @@ def _quads_by_steps(
     joined = (part[0] > 0) & (part == part[0]).all(0)
     joined &= (step <= MAX_CHART_STEP * 255) & (stretch <= MAX_STRETCH)
     wanted = stretch * size * SAMPLES_PER_TEXEL
-    quad = torch.arange(part[0].numel(), device=iuv.device).view_as(part[0])
     groups, low, steps = [], SAMPLES_PER_TEXEL, 4  # under one texel apart: none lies between
     while low < MAX_STRETCH * size * SAMPLES_PER_TEXEL:
-        chosen = joined & (wanted > low) & (wanted <= steps)
-        if chosen.any():
-            groups.append((steps, quad, chosen))
+        quads = (joined & (wanted > low) & (wanted <= steps)).nonzero()
+        if len(quads):
+            groups.append((steps, quads))
         low, steps = steps, steps * 2
     return groups
 
@@ -130,24 +129,32 @@ def _fill_points(
     colours: Float[Tensor, "B H W C"],
     iuv: UInt8[Tensor, "B 3 H W"],
     charts: Float[Tensor, "24 256 256 2"],
-    quad: Int64[Tensor, "B Hq Wq"],
-    chosen: Bool[Tensor, "B Hq Wq"],
+    quads: Int64[Tensor, "Q 3"],
     steps: int,
     size: int,
 ) -> tuple[Float[Tensor, "N C"], Int64[Tensor, " N"]]:
-    """Colours and texels of steps x steps points spread evenly inside each chosen quad."""
+    """Colours and texels of steps x steps points spread evenly inside each quad."""
     precise = torch.promote_types(colours.dtype, torch.float32)
     line = (torch.arange(steps, device=iuv.device, dtype=precise) + 0.5) / steps
     y, x = (axis.reshape(-1) for axis in torch.meshgrid(line, line, indexing="ij"))
-    weights = torch.stack([(1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x])
+    weights = _bilinear(y, x)
 
-    values = torch.einsum("kp,kqc->qpc", weights.to(colours.dtype), _corners(colours)[:, chosen])
-    chart_uv = _corners(iuv[:, 1:].permute(0, 2, 3, 1).to(precise))[:, chosen]
-    between = torch.einsum("kp,kqc->qpc", weights, chart_uv)
-    part = iuv[:, 0, :-1, :-1][chosen].long()[:, None].expand(between.shape[:-1])
+    batch, top, left = quads.unbind(1)
+    corners = [(batch, top + down, left + right) for down in (0, 1) for right in (0, 1)]
+    corner_colours = torch.stack([colours[corner] for corner in corners])
+    corner_iuv = torch.stack([iuv.permute(0, 2, 3, 1)[corner] for corner in corners])
+    values = torch.einsum("kp,kqc->qpc", weights.to(colours.dtype), corner_colours)
+    between = torch.einsum("kp,kqc->qpc", weights, corner_iuv[..., 1:].to(precise))
+    part = corner_iuv[0, :, :1].long().expand(between.shape[:-1])
     place = _place_between_entries(charts, part, between)
-    batch = quad[chosen].div(quad[0].numel(), rounding_mode="floor")[:, None]
-    return values.flatten(0, 1), _texel(place, batch, size).flatten()
+    return values.flatten(0, 1), _texel(place, batch[:, None], size).flatten()
+
+
+def _bilinear(down: Tensor, right: Tensor) -> Tensor:
+    """Weights of a quad's corners (row by row) at places inside it, each axis in [0, 1]."""
+    return torch.stack(
+        [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
+    )
 
 
 def _place_between_entries(
@@ -158,9 +165,7 @@ def _place_between_entries(
     (right, down), (u, v) = (uv - low).unbind(-1), low.long().unbind(-1)
     table = charts.view(-1, 2)
     corners = torch.stack([table[chart_index(part, u + x, v + y)] for y in (0, 1) for x in (0, 1)])
-    weights = torch.stack(
-        [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
-    )
+    weights = _bilinear(down, right)
     smooth = (corners.amax(0) - corners.amin(0)).amax(-1, keepdim=True) <= MAX_ENTRY_STEP
     u, v = uv.round().long().unbind(-1)
     return torch.where(

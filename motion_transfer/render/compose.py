@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.render.options import parse_colour
-from motion_transfer.render.person import occupancy
+from motion_transfer.render.person import disc, occupancy
 from motion_transfer.render.source import Source
 from motion_transfer.render.window import Window
 
@@ -48,11 +48,10 @@ def remove_person(photo: Frame, iuv: UInt8[np.ndarray, "H W 3"]) -> Frame:
     """The photo with its person painted over from around."""
     mask = occupancy(iuv)
     rows = np.flatnonzero(mask.any(1))
-    radius = max(2, round((rows[-1] - rows[0] + 1) * PERSON_GROWTH))
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    radius = max(2, (rows[-1] - rows[0] + 1) * PERSON_GROWTH)
     scale = min(1, 512 / max(photo.shape[:2]))  # the fill is smooth, and slow at full size
     small_size = (max(1, round(photo.shape[1] * scale)), max(1, round(photo.shape[0] * scale)))
-    grown = cv2.dilate(mask, kernel)
+    grown = cv2.dilate(mask, disc(radius))
     small = cv2.resize(photo, small_size, interpolation=cv2.INTER_AREA)
     small_mask = cv2.resize(grown, small_size, interpolation=cv2.INTER_AREA)
     small_mask = cv2.dilate(small_mask, np.ones((3, 3), np.uint8))

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import UInt8
 from torch import Tensor
 
-from motion_transfer.render.person import occupancy
+from motion_transfer.render.person import disc, occupancy
 from motion_transfer.render.source import Source
 from nhrr_core import FastRenderNet, NeuralReRenderer, RenderNet
 
@@ -74,9 +74,8 @@ class NeuralRenderer:
 def grow_mask(iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S"]:
     """Coverage for a model without alpha: the IUV outline, grown and softened."""
     reach = max(1, round(iuv.shape[0] * MASK_REACH_SHARE))
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     mask = occupancy(iuv) * 255
-    return cv2.blur(cv2.dilate(mask, kernel), (reach | 1, reach | 1))
+    return cv2.blur(cv2.dilate(mask, disc(reach)), (reach | 1, reach | 1))
 
 
 def choose_dtype(device: torch.device) -> torch.dtype:

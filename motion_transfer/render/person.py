@@ -62,6 +62,12 @@ def occupancy(iuv: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
     return (iuv[..., 0] > 0).astype(np.uint8)
 
 
+def disc(radius: float) -> UInt8[np.ndarray, "D D"]:
+    """A round neighbourhood for growing and shrinking masks; at least one pixel in radius."""
+    side = 2 * max(1, round(radius)) + 1
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+
+
 def isolate(iuv: UInt8[np.ndarray, "H W 3"], person: Person) -> UInt8[np.ndarray, "H W 3"]:
     """The IUV with everything but one of its people turned into background."""
     _, labels = _find_people(iuv)

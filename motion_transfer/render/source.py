@@ -15,7 +15,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.image import Photo, read_photo
 from motion_transfer.media.iuv_image import ChannelOrder, decide_order, read_raw_iuv, to_iuv
 from motion_transfer.render.options import Garment, RenderOptions
-from motion_transfer.render.person import choose_person, find_people, isolate, occupancy
+from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
 from nhrr_core.iuv import PART_COUNT, PART_NAMES
 
@@ -126,7 +126,7 @@ def trim_outline(
         height * scale,
     )
     person = mask & cv2.resize(labels, mask.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    return iuv * cv2.erode(person, _disc(height * TRIM_SHARE))[..., None]
+    return iuv * cv2.erode(person, disc(height * TRIM_SHARE))[..., None]
 
 
 def _cut_out(
@@ -135,9 +135,9 @@ def _cut_out(
     """1 where a person of that height in px is, by colour along the outline of a rough mask."""
     band = height * BAND_SHARE
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 3)
-    thickness = cv2.dilate(depth, _disc(band))
+    thickness = cv2.dilate(depth, disc(band))
     inner = depth >= np.minimum(band, thickness / 2)  # a limb thinner than the band keeps its core
-    outer = cv2.dilate(mask, _disc(band))
+    outer = cv2.dilate(mask, disc(band))
     if outer.all():
         return mask
     labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
@@ -146,11 +146,6 @@ def _cut_out(
     models = np.zeros((1, 65)), np.zeros((1, 65))
     cv2.grabCut(rgb, labels, (0, 0, 1, 1), *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
     return labels & 1  # the odd labels, GC_FGD and GC_PR_FGD, are the person
-
-
-def _disc(radius: float) -> np.ndarray:
-    side = 2 * max(1, round(radius)) + 1
-    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
 
 
 def _unfold_garment(
