@@ -16,6 +16,7 @@ from motion_transfer.version import __version__
 COMMANDS = {
     "run": "Render the person of a photo in the motion of a driver.",
     "demo": "Render a photo and a driver that ship with the program.",
+    "people": "Synthetic people: photos with exact IUV, and drivers from motion.",
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",
     "info": "Versions, device, renderers, sizes of a run; part names.",
 }

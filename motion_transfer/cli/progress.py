@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any, Self
 
 import click
 from tqdm import tqdm
@@ -90,3 +94,51 @@ def describe(event: Finished) -> str:
         f" ({RENDERER_WORDS[event.renderer]}; {event.wall_seconds:.1f} s in all,"
         f" {rate:.0f} frames/s while rendering)"
     )
+
+
+class CountBar:
+    """A bar for work that is counted; nothing where stderr is no terminal."""
+
+    def __init__(self, words: str, *, unit: str, quiet: bool, total: int | None = None) -> None:
+        self._show = sys.stderr.isatty() and not quiet
+        self._settings: dict[str, Any] = {"desc": words, "unit": unit, "total": total}
+        self._bar: tqdm | None = None
+
+    def __enter__(self) -> Self:
+        if self._show:
+            self._bar = tqdm(**self._settings, leave=False, dynamic_ncols=True)
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def advance(self, count: int) -> None:
+        """So many more are done."""
+        if self._bar is not None:
+            self._bar.update(count)
+
+
+@contextmanager
+def long_wait(words: str, *, quiet: bool) -> Iterator[None]:
+    """Say what is waited for, and on a terminal for how long already, while the block runs."""
+    if quiet or not sys.stderr.isatty():
+        if not quiet:
+            click.echo(f"mt: note: {words}", err=True)
+        yield
+        return
+    ended = threading.Event()
+
+    def show() -> None:
+        began = time.monotonic()
+        while not ended.wait(0.5):
+            click.echo(f"\r{words}: {time.monotonic() - began:.0f} s", err=True, nl=False)
+        click.echo("\r" + " " * (len(words) + 12) + "\r", err=True, nl=False)
+
+    clock = threading.Thread(target=show, daemon=True)
+    clock.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        clock.join()

@@ -65,9 +65,11 @@ def read_photo(path: Path, what: str = "source") -> Photo:
     return Photo(path=path, rgb=np.ascontiguousarray(pixels[..., :3]), alpha=alpha, turned=turned)
 
 
-def write_png(path: Path, rgb: UInt8[np.ndarray, "H W 3"]) -> None:
-    """Write a picture as PNG. Raises: OSError."""
-    ok, encoded = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+def write_png(
+    path: Path, pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W"]
+) -> None:
+    """Write a picture, RGB or grey, as PNG. Raises: OSError."""
+    ok, encoded = cv2.imencode(".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels)
     if not ok:
-        raise OSError(f"cannot encode a PNG of {rgb.shape}")
+        raise OSError(f"cannot encode a PNG of {pixels.shape}")
     path.write_bytes(encoded.tobytes())

@@ -14,6 +14,8 @@ from motion_transfer.media.formats import OutputFormat, choose_format
 from motion_transfer.media.image import write_png
 from motion_transfer.media.iuv_stream import IuvReader, list_gaps, open_reader, open_stream
 from motion_transfer.media.publish import check_destination, publish, work_folder
+from motion_transfer.media.stream import IuvStream
+from motion_transfer.people.stream import is_motion
 from motion_transfer.render.compose import Comparison, make_background
 from motion_transfer.render.engine import Canvas, Engine
 from motion_transfer.render.events import (
@@ -125,7 +127,7 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
 
 
 def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, DriverPlan]:
-    stream = open_stream(options.driver, missing=options.missing)
+    stream = _open_driver(options, listener)
     if stream.gaps:
         listener(Notice(f"{list_gaps(stream.gaps)}; each repeats the frame before it"))
     reader = open_reader(stream, options.iuv_order)
@@ -142,6 +144,17 @@ def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, Driver
     for start, stop in empty_stretches(plan):
         listener(Notice(f"frames {start}:{stop} of the driver show nobody: background only"))
     return reader, plan
+
+
+def _open_driver(options: RenderOptions, listener: Listener) -> IuvStream:
+    if not is_motion(options.driver):
+        return open_stream(options.driver, missing=options.missing)
+    from motion_transfer.people.body import FIRST_USE, is_cached
+    from motion_transfer.people.stream import open_motion
+
+    if not is_cached():
+        listener(Notice(FIRST_USE))
+    return open_motion(options.driver)
 
 
 def _open_renderer(

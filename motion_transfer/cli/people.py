@@ -1,0 +1,157 @@
+"""`mt people`."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from motion_transfer.cli.progress import CountBar, long_wait
+from motion_transfer.cli.sections import SectionCommand, SectionOption
+
+FILE = click.Path(path_type=Path)
+SHARE = click.FloatRange(0, 1)
+
+
+def section(heading: str) -> Any:
+    """An option decorator whose options stand under one heading."""
+    return partial(click.option, cls=SectionOption, section=heading)
+
+
+motion_option = section("Motion")
+body_option = section("Body (each 0..1)")
+camera_option = section("Camera")
+people_option = section("People")
+picture_option = section("Pictures")
+output_option = section("Output")
+
+
+@click.group()
+def people() -> None:
+    """Synthetic people: photos with exact IUV, and drivers from motion.
+
+    \b
+    mt people drive walk -o walk.mkv
+    mt run --source photo.png --driver people:dance -o out.mp4
+    mt people render --count 100 --out people/
+    """
+
+
+@people.command(cls=SectionCommand)
+@click.argument("motion", metavar="MOTION|FILE.bvh")
+@motion_option(
+    "--frames", "frame_count", type=int, help="Default: one loop at its pace, or the whole file."
+)
+@motion_option("--fps", default="30", metavar="RATE", help="Such as 25 or 30000/1001; default 30.")
+@motion_option("--travel", is_flag=True, help="Go where a BVH file goes, not on the spot.")
+@body_option("--gender", type=SHARE, help="0 male, 1 female.")
+@body_option("--age", type=SHARE, help="0.67 young adult, 1 old.")
+@body_option("--height", type=SHARE, help="Short to tall.")
+@body_option("--weight", type=SHARE, help="Thin to heavy.")
+@body_option("--muscle", type=SHARE, help="Slack to muscular.")
+@body_option("--proportions", type=SHARE, help="Uncommon to ideal.")
+@camera_option(
+    "--framing", default="full", metavar="PART", help="full (default), three-quarters or upper."
+)
+@camera_option("--azimuth", type=float, default=0.0, help="Degrees around, to the person's left.")
+@camera_option("--elevation", type=float, default=4.0, help="Degrees up; default 4.")
+@camera_option("--distance", type=float, default=4.0, help="Metres; default 4.")
+@output_option("--size", default="512x512", metavar="WxH", help="Pixels; default 512x512.")
+@output_option(
+    "-o", "--output", type=FILE, required=True, help="A folder for PNG, or a lossless .mkv."
+)
+@output_option("--force", is_flag=True, help="Replace an existing output.")
+@output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+def drive(
+    motion: str,
+    output: Path,
+    fps: str,
+    size: str,
+    force: bool,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Make a driver (IUV frames) from a motion.
+
+    Motions are walk, turntable, dance, wave and jumping-jacks, each a smooth loop, or a BVH file.
+    A driver can also be made on the fly: mt run --driver people:walk.
+
+    \b
+    mt people drive walk -o walk_iuv/
+    mt people drive turntable --frames 120 --azimuth 30 -o turn.mkv
+    mt people drive capture.bvh --fps 25 --gender 1 --size 384x512 -o capture.mkv
+    """
+    from motion_transfer.people.driver import MotionOptions, check_motion
+    from motion_transfer.people.recording import record_motion
+    from motion_transfer.people.stream import parse_size
+    from motion_transfer.render.options import parse_rate
+
+    check_motion(motion)
+    body = {name: options.pop(name) for name in BODY_OPTIONS}
+    shape = _shape({name: value for name, value in body.items() if value is not None})
+    settings = MotionOptions(
+        motion=motion, frame_rate=parse_rate(fps), size=parse_size(size), shape=shape, **options
+    )
+    _prepare(quiet)
+    with CountBar("drawing", unit="frame", quiet=quiet) as bar:
+        driver = record_motion(settings, output, force=force, done=bar.advance)
+    if not quiet:
+        seconds = float(driver.frame_count / driver.frame_rate)
+        click.echo(f"{output}: {driver.frame_count} frames, {seconds:.2f} s of {motion}")
+
+
+@people.command(cls=SectionCommand)
+@people_option("--count", type=int, required=True, help="How many people.")
+@people_option("--views", type=int, default=2, help="Photos of each; default 2.")
+@people_option("--seed", type=int, default=0, help="Same seed, same bytes; default 0.")
+@people_option(
+    "--split", default="train", metavar="NAME", help="train (default) or held-out: never the same."
+)
+@picture_option("--size", default="256x256", metavar="WxH", help="Pixels; default 256x256.")
+@picture_option(
+    "--framing", metavar="PART", help="full, three-quarters or upper; default: mixed."
+)
+@picture_option("--noise", is_flag=True, help="Put DensePose's usual faults into the IUV.")
+@output_option("-o", "--out", type=FILE, required=True, help="A folder; completed if it has some.")
+@output_option("--workers", type=int, help="Processes; default: one for each core.")
+@output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+def render(quiet: bool, size: str, **options: Any) -> None:
+    """Photograph synthetic people into a folder.
+
+    Each person gets a folder with photos, their IUV and alpha, and a JSON description; pairs.csv
+    lists pictures of the same person. A run that was stopped goes on where it was.
+
+    \b
+    mt people render --count 100 --out people/
+    mt people render --count 20 --views 4 --size 512x512 --framing upper --out heads/
+    """
+    from motion_transfer.people.album import AlbumOptions, write_album
+    from motion_transfer.people.stream import parse_size
+
+    settings = AlbumOptions(size=parse_size(size), **options)
+    _prepare(quiet)
+    with CountBar("photographing", unit="person", total=settings.count, quiet=quiet) as bar:
+        added = write_album(settings, bar.advance)
+    if not quiet:
+        there = f" ({settings.count - added} were there)" if added < settings.count else ""
+        click.echo(f"{settings.out}: {added} people added{there}, {settings.views} photos each")
+
+
+BODY_OPTIONS = ("gender", "age", "height", "weight", "muscle", "proportions")
+
+
+def _shape(values: dict[str, float]) -> Any:
+    from motion_transfer.people.body import Shape
+
+    return Shape(**values)
+
+
+def _prepare(quiet: bool) -> None:
+    """Where the body model has to compute its cache first, say so while it does."""
+    from motion_transfer.people.body import FIRST_USE, is_cached, load_body_model
+
+    if not is_cached():
+        with long_wait(FIRST_USE, quiet=quiet):
+            load_body_model()

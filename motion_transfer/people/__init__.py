@@ -1,0 +1,1 @@
+"""Synthetic people: photos with exact IUV, and drivers from motion."""

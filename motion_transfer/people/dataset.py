@@ -1,0 +1,120 @@
+"""Pairs of photos of synthetic people, made as they are asked for."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from motion_transfer.errors import InputError
+from motion_transfer.people.body import load_body_model
+from motion_transfer.people.framing import Framing
+from motion_transfer.people.iuv_noise import IuvNoise
+from motion_transfer.people.person import DressedPerson, Person, sample_person
+from motion_transfer.people.photo import Photographer, PersonPhoto, Shot, sample_shot
+
+Split = Literal["train", "held-out"]
+SPLITS: tuple[str, ...] = get_args(Split)
+"""Two streams of people that never meet, whatever the seed."""
+
+
+class PeopleStream:
+    """People by number: the same seed, split and number always give the same bytes.
+
+    Args:
+        size: (width, height) of the photos in px.
+        noise: faults of DensePose to put into the IUV; None: exact.
+        framing: None: mixed.
+    """
+
+    def __init__(
+        self,
+        *,
+        seed: int = 0,
+        split: Split = "train",
+        size: tuple[int, int] = (256, 256),
+        noise: IuvNoise | None = None,
+        framing: Framing | None = None,
+    ) -> None:
+        if split not in SPLITS:
+            raise InputError(f"split {split!r}; supported are {', '.join(SPLITS)}")
+        if seed < 0:
+            raise InputError(f"seed is {seed}; it must be 0 or more")
+        self.size = size
+        self._entropy = (seed, SPLITS.index(split))
+        self._noise = noise
+        self._framing: Framing | None = framing
+        self._model = load_body_model()
+        self._photographer = Photographer(self._model)
+
+    def person(self, number: int) -> Person:
+        """Who has that number."""
+        return sample_person(self._random(number, 0))
+
+    def shot(self, number: int, view: int) -> Shot:
+        """How that person is photographed for the given time (0 first)."""
+        return sample_shot(self._random(number, 1 + view), framing=self._framing)
+
+    def dress(self, number: int) -> DressedPerson:
+        """The geometry of that person."""
+        return DressedPerson(self.person(number), self._model)
+
+    def take(self, dressed: DressedPerson, shot: Shot) -> PersonPhoto:
+        """Take a photo."""
+        return self._photographer.take(dressed, shot, self.size, self._noise)
+
+    def _random(self, number: int, purpose: int) -> np.random.Generator:
+        return np.random.default_rng((*self._entropy, number, purpose))
+
+
+class PeopleDataset(Dataset):
+    """Pairs (source, target): one person, two poses, made without touching the disk.
+
+    Indexable, so that samplers, several workers and resumed runs see the same pairs.
+
+    Args:
+        length: number of pairs; each has a person of its own.
+        **settings: of `PeopleStream`.
+    """
+
+    def __init__(self, length: int, **settings) -> None:
+        if length < 1:
+            raise InputError(f"length is {length}; a data set needs at least 1 pair")
+        self._length = length
+        self._settings = settings
+        self._stream: PeopleStream | None = None
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: int) -> dict[str, Tensor]:
+        """One pair.
+
+        Returns: for `source` and `target` each: `_image` float 3 x H x W in [-1, 1], `_iuv` uint8
+            3 x H x W (I, U, V), `_alpha` float 1 x H x W in [0, 1].
+        Raises: IndexError beyond the length.
+        """
+        if not 0 <= index < self._length:
+            raise IndexError(index)
+        if self._stream is None:  # made where it is used: the body model does not travel to workers
+            self._stream = PeopleStream(**self._settings)
+        dressed = self._stream.dress(index)
+        pair: dict[str, Tensor] = {}
+        for view, role in enumerate(("source", "target")):
+            photo = self._stream.take(dressed, self._stream.shot(index, view))
+            pair |= {f"{role}_{name}": value for name, value in photo_tensors(photo).items()}
+        return pair
+
+
+def photo_tensors(photo: PersonPhoto) -> dict[str, Float[Tensor, "C H W"] | UInt8[Tensor, "3 H W"]]:
+    """A photo as the model takes it."""
+    rgb, iuv = (torch.from_numpy(image).permute(2, 0, 1) for image in (photo.rgb, photo.iuv))
+    return {
+        "image": rgb.float() / 127.5 - 1,
+        "iuv": iuv.contiguous(),
+        "alpha": torch.from_numpy(photo.alpha)[None].float() / 255,
+    }

@@ -1,0 +1,103 @@
+"""A person: who they are and what they wear, and the geometry of it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from motion_transfer.people.body import Body, BodyModel, Shape
+from motion_transfer.people.faces import Face, sample_face
+from motion_transfer.people.garments import dress_body
+from motion_transfer.people.hair import Hair, hair_pieces, sample_hair
+from motion_transfer.people.mesh import Piece, PosedBody
+from motion_transfer.people.outfits import Outfit, sample_outfit
+from motion_transfer.people.poses import Pose
+from motion_transfer.people.posing import posed
+from motion_transfer.people.skin import skin_pieces
+from motion_transfer.people.surface import BodySurface
+
+
+@dataclass(frozen=True)
+class Person:
+    """Everything that stays the same between two pictures of somebody."""
+
+    shape: Shape
+    face: Face
+    hair: Hair
+    outfit: Outfit
+
+    def description(self) -> dict[str, Any]:
+        """Plain numbers, words and lists, for JSON."""
+        return asdict(self)
+
+
+def sample_person(rng: np.random.Generator) -> Person:
+    """Anybody, over the whole range of adult bodies."""
+    shape = sample_shape(rng)
+    return Person(
+        shape=shape,
+        face=sample_face(rng, shape),
+        hair=sample_hair(rng, shape),
+        outfit=sample_outfit(rng, shape),
+    )
+
+
+def sample_shape(rng: np.random.Generator) -> Shape:
+    """An adult's build: most are near the middle, some far from it."""
+    female = rng.random() < 0.55
+    gender = 1 - abs(rng.normal(0, 0.12)) if female else abs(rng.normal(0, 0.12))
+
+    def spread(middle: float, width: float) -> float:
+        return float(np.clip(rng.normal(middle, width), 0, 1))
+
+    origins = rng.dirichlet((0.5, 0.5, 0.5))
+    return Shape(
+        gender=float(np.clip(gender, 0, 1)),
+        age=float(0.64 + 0.34 * rng.beta(1.0, 2.4)),
+        muscle=spread(0.5, 0.17),
+        weight=spread(0.46, 0.18),
+        height=spread(0.5, 0.17),
+        proportions=spread(0.62, 0.2),
+        cupsize=spread(0.45, 0.18),
+        firmness=spread(0.6, 0.2),
+        african=float(origins[0]),
+        asian=float(origins[1]),
+        caucasian=float(origins[2]),
+    )
+
+
+class DressedPerson:
+    """A person's geometry at rest, ready for any number of poses.
+
+    Attributes:
+        person: the description.
+        body: the bare body at rest.
+        pieces: skin, garments, hair; the skin comes first.
+    """
+
+    def __init__(self, person: Person, model: BodyModel) -> None:
+        self.person = person
+        self.body: Body = model.body(person.shape)
+        self._model = model
+        skin, *rest = skin_pieces(person.face, self.body, model)
+        dressed = dress_body(person.outfit, self.body, model, body_surface(model))
+        covered = replace(skin, keep=np.minimum(skin.keep, dressed.body_keep))
+        self.pieces: list[Piece] = [
+            covered,
+            *rest,
+            *dressed.pieces,
+            *hair_pieces(person.hair, self.body, model),
+        ]
+
+    def posed(self, pose: Pose) -> PosedBody:
+        """The body in a pose, standing on the floor z = 0."""
+        return posed(self.body, pose, self._model)
+
+
+@lru_cache(maxsize=1)
+def body_surface(model: BodyModel) -> BodySurface:
+    """Names of places on the skin, worked out once."""
+    return BodySurface(model)

@@ -1,0 +1,164 @@
+"""A photo of a synthetic person, with everything that a real photo does not tell."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from motion_transfer.people.backgrounds import Background, paint_background, sample_background
+from motion_transfer.people.body import BodyModel
+from motion_transfer.people.camera import Camera
+from motion_transfer.people.charts import load_charts
+from motion_transfer.people.exact_iuv import render_iuv
+from motion_transfer.people.framing import Framing, frame_points, lowest_in
+from motion_transfer.people.ground import floor_shadow
+from motion_transfer.people.iuv_noise import IuvNoise, add_iuv_noise
+from motion_transfer.people.light import Light, sample_light
+from motion_transfer.people.person import DressedPerson
+from motion_transfer.people.pose_sampler import sample_pose
+from motion_transfer.people.poses import Pose
+from motion_transfer.people.shade import Shading, shade
+
+FRAMING_SHARES: dict[Framing, float] = {"full": 0.6, "three-quarters": 0.25, "upper": 0.15}
+LENS_NOISE = 0.006
+"""Sensor noise of a small photo, as a share of white."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture of somebody: pose, camera, light and surroundings.
+
+    Attributes:
+        margin: share of the picture left free around the person.
+        shift: of the person within what is free, each in [-1, 1].
+        grain: sensor noise, standard deviation as a share of white; drawn from `seed`.
+    """
+
+    pose: Pose
+    framing: Framing
+    distance: float
+    elevation: float
+    roll: float
+    margin: float
+    shift: tuple[float, float]
+    light: Light
+    background: Background
+    grain: float
+    seed: int
+
+    def description(self) -> dict[str, Any]:
+        """Plain numbers, words and lists, for JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class PersonPhoto:
+    """What a shot shows.
+
+    Attributes:
+        rgb: the photo.
+        alpha: how much of each pixel the person covers, clothes and hair included; 255 is all.
+        iuv: (I, U, V) of the bare body, with noise where it was asked for.
+        camera: that took it.
+    """
+
+    rgb: UInt8[np.ndarray, "H W 3"]
+    alpha: UInt8[np.ndarray, "H W"]
+    iuv: UInt8[np.ndarray, "H W 3"]
+    camera: Camera
+
+
+def sample_shot(rng: np.random.Generator, *, framing: Framing | None = None) -> Shot:
+    """A catalogue or street photo: any pose, most cameras at chest height."""
+    names = list(FRAMING_SHARES)
+    chosen = framing or names[rng.choice(len(names), p=list(FRAMING_SHARES.values()))]
+    return Shot(
+        pose=sample_pose(rng),
+        framing=cast(Framing, chosen),
+        distance=float(rng.uniform(2.2, 6.0)),
+        elevation=float(rng.normal(0.05, 0.07)),
+        roll=float(rng.normal(0, 0.015)),
+        margin=float(rng.uniform(0.02, 0.1)),
+        shift=(float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.3, 0.3))),
+        light=sample_light(rng),
+        background=sample_background(rng),
+        grain=float(LENS_NOISE * rng.random() ** 2),
+        seed=int(rng.integers(2**32)),
+    )
+
+
+class Photographer:
+    """Takes photos of dressed people."""
+
+    def __init__(self, model: BodyModel) -> None:
+        self._model = model
+        self._charts = load_charts()
+
+    def take(
+        self,
+        dressed: DressedPerson,
+        shot: Shot,
+        size: tuple[int, int],
+        noise: IuvNoise | None = None,
+    ) -> PersonPhoto:
+        """Take a shot at a size of (width, height) px."""
+        rng = np.random.default_rng(shot.seed)
+        posed = dressed.posed(shot.pose)
+        lowest = lowest_in(posed.joints, self._model.skeleton, shot.framing)
+        camera = frame_points(
+            posed.points[posed.points[:, 2] >= lowest],
+            size,
+            distance=shot.distance,
+            elevation=shot.elevation,
+            roll=shot.roll,
+            margin=shot.margin,
+            shift=shot.shift,
+        )
+        seen = shade(dressed.pieces, posed, camera, shot.light)
+        alpha = np.rint(seen.coverage * 255).astype(np.uint8)
+        horizon = camera.height / 2 - camera.focal_px * np.tan(camera.elevation)
+        pixels_per_metre = camera.focal_px / camera.distance
+        behind = paint_background(
+            shot.background, camera.height, camera.width, float(horizon), pixels_per_metre
+        )
+        if shot.background.has_floor:
+            behind *= 1 - floor_shadow(posed.points, camera, shot.light)[..., None]
+        rgb = develop(composite(seen, behind), shot.grain, rng)
+        iuv = render_iuv(posed.points, self._model.faces, self._charts, camera)
+        if noise is not None:
+            iuv = add_iuv_noise(iuv, noise, rng)
+        return PersonPhoto(rgb, alpha, iuv, camera)
+
+
+def composite(seen: Shading, behind: Float32[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"]:
+    """The person in front of a background, both linear."""
+    return seen.colour + behind * (1 - seen.coverage[..., None])
+
+
+def develop(
+    linear: Float32[np.ndarray, "H W 3"], grain: float, rng: np.random.Generator
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Linear light as 8-bit sRGB, with sensor noise; what is too bright rolls off softly."""
+    index = np.clip(linear * (len(_TONE) - 1) / TONE_RANGE, 0, len(_TONE) - 1).astype(np.uint16)
+    tone = _TONE[index]
+    if grain > 0:
+        tone += rng.standard_normal(tone.shape[:2], np.float32)[..., None] * (255 * grain)
+    return np.clip(np.rint(tone), 0, 255).astype(np.uint8)
+
+
+TONE_RANGE = 2.0
+
+
+def _tone_curve() -> Float32[np.ndarray, " N"]:
+    """sRGB value (0..255) of linear light from 0 to TONE_RANGE, bent above 0.8."""
+    light = np.linspace(0, TONE_RANGE, 8192)
+    knee = 0.8
+    bent = np.where(light < knee, light, 1 - (1 - knee) * np.exp(-(light - knee) / (1 - knee)))
+    encoded = np.where(bent <= 0.0031308, 12.92 * bent, 1.055 * bent ** (1 / 2.4) - 0.055)
+    return (255 * encoded).astype(np.float32)
+
+
+_TONE = _tone_curve()

@@ -1,0 +1,361 @@
+"""What a surface looks like under a light: albedo, relief, highlights, shadows, occlusion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import warp as wp
+from jaxtyping import Float32, UInt64
+
+from motion_transfer.people.body import Faces, Points
+from motion_transfer.people.camera import Camera
+from motion_transfer.people.light import Light
+from motion_transfer.people.mesh import Piece, PosedBody
+from motion_transfer.people.rasterise import EMPTY, Layer, depths, rasterise, share_array
+
+SAMPLES = 2
+"""Samples along each side of a pixel."""
+
+SHADOW_SIZE = 256
+SHADOW_BIAS_METRES = 0.012
+OCCLUSION_RADII_METRES = (0.03, 0.12)
+OCCLUSION_THRESHOLD = 0.12
+"""A round surface is a little behind its own neighbourhood; that is no occlusion."""
+
+WRAP_TINT = wp.constant(wp.vec3(1.0, 0.55, 0.4))
+"""Light that wraps around skin has passed through it, and comes out red."""
+
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+SHADOW_DISC = wp.constant(
+    wp.types.matrix((8, 2), wp.float32)(
+        *(
+            float(np.sqrt((k + 0.5) / 8) * turn(GOLDEN_ANGLE * k))
+            for k in range(8)
+            for turn in (np.cos, np.sin)
+        )
+    )
+)
+"""Eight places spread evenly over a disc of radius 1."""
+
+
+@wp.struct
+class LightInput:
+    toward: wp.mat33  # rows: unit vectors toward the lamps
+    colour: wp.mat33  # rows
+    lamps: wp.int32
+    sky: wp.vec3
+    ground: wp.vec3
+    camera: wp.vec3
+    shadow_x: wp.vec4  # rows of the map from the world to shadow-map pixels and depth
+    shadow_y: wp.vec4
+    shadow_z: wp.vec4
+    softness_px: wp.float32
+    lit: wp.int32
+
+
+@wp.struct
+class MaterialInput:
+    size: wp.vec2
+    gloss: wp.float32
+    sharpness: wp.float32
+    translucency: wp.float32
+    sheen_along_v: wp.int32
+
+
+@wp.kernel(enable_backward=False)
+def _add_normals(
+    points: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    normals: wp.array(dtype=wp.vec3),
+):
+    corners = faces[wp.tid()]
+    a = points[corners[0]]
+    n = wp.cross(points[corners[1]] - a, points[corners[2]] - a)
+    wp.atomic_add(normals, corners[0], n)
+    wp.atomic_add(normals, corners[1], n)
+    wp.atomic_add(normals, corners[2], n)
+
+
+@wp.func
+def _texel(texture: wp.array2d(dtype=wp.vec4), u: float, v: float):
+    """Bilinear; repeats along u, clamps along v."""
+    height, width = texture.shape[0], texture.shape[1]
+    x = (u - wp.floor(u)) * float(width) - 0.5
+    y = wp.clamp(v * float(height) - 0.5, 0.0, float(height - 1))
+    x0, y0 = int(wp.floor(x)), int(wp.floor(y))
+    fx, fy = x - float(x0), y - float(y0)
+    y1 = wp.min(y0 + 1, height - 1)
+    x1 = x0 + 1
+    if x0 < 0:
+        x0 = width - 1
+    if x1 >= width:
+        x1 = 0
+    top = texture[y0, x0] * (1.0 - fx) + texture[y0, x1] * fx
+    bottom = texture[y1, x0] * (1.0 - fx) + texture[y1, x1] * fx
+    return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def _keyshare_array(
+    light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: float
+):
+    """How much of the key lamp a point sees, from 8 places of a disc in the shadow map."""
+    p = wp.vec4(point[0], point[1], point[2], 1.0)
+    x, y, z = wp.dot(light.shadow_x, p), wp.dot(light.shadow_y, p), wp.dot(light.shadow_z, p)
+    cosine, sine = light.softness_px * wp.cos(spin), light.softness_px * wp.sin(spin)
+    open_taps = float(0.0)
+    for k in range(8):
+        dx, dy = SHADOW_DISC[k, 0], SHADOW_DISC[k, 1]
+        i = wp.clamp(int(y + dx * sine + dy * cosine), 0, shadow.shape[0] - 1)
+        j = wp.clamp(int(x + dx * cosine - dy * sine), 0, shadow.shape[1] - 1)
+        if shadow[i, j] > z:
+            open_taps += 0.125
+    return open_taps
+
+
+@wp.kernel(enable_backward=False)
+def _shade(
+    nearest: wp.array(dtype=wp.uint64),
+    first_id: wp.int32,
+    screen: wp.array(dtype=wp.vec3),
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    corner_uv: wp.array2d(dtype=wp.vec2),
+    texture: wp.array2d(dtype=wp.vec4),
+    material: MaterialInput,
+    light: LightInput,
+    shadow: wp.array2d(dtype=wp.float32),
+    openness: wp.array2d(dtype=wp.float32),
+    samples: wp.int32,
+    colour: wp.array2d(dtype=wp.vec4),
+):
+    row, column = wp.tid()
+    width = colour.shape[1] * samples
+    packed = nearest[row * width + column]
+    face = int(wp.uint32(packed & wp.uint64(0xFFFFFFFF))) - first_id
+    if face < 0 or face >= faces.shape[0]:
+        return
+    corners = faces[face]
+    sa, sb, sc = screen[corners[0]], screen[corners[1]], screen[corners[2]]
+    px, py = float(column) + 0.5, float(row) + 0.5
+    area = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
+    wb = ((px - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (py - sa[1])) / area
+    wc = ((sb[0] - sa[0]) * (py - sa[1]) - (px - sa[0]) * (sb[1] - sa[1])) / area
+    wa = (1.0 - wb - wc) / sa[2]
+    wb = wb / sb[2]
+    wc = wc / sc[2]
+    total = wa + wb + wc
+    wa = wa / total
+    wb = wb / total
+    wc = wc / total
+
+    ta, tb, tc = corner_uv[face, 0], corner_uv[face, 1], corner_uv[face, 2]
+    uv = ta * wa + tb * wb + tc * wc
+    texel = _texel(texture, uv[0], uv[1])
+    albedo = wp.vec3(texel[0], texel[1], texel[2])
+    result = albedo
+    if light.lit != 0:
+        pa, pb, pc = points[corners[0]], points[corners[1]], points[corners[2]]
+        point = pa * wa + pb * wb + pc * wc
+        normal = wp.normalize(
+            normals[corners[0]] * wa + normals[corners[1]] * wb + normals[corners[2]] * wc
+        )
+        view = wp.normalize(light.camera - point)
+        if area > 0.0:
+            normal = -normal  # the inside of cloth or hair
+
+        # directions in which u and v grow on the surface, for relief and strands
+        e1, e2 = pb - pa, pc - pa
+        d1, d2 = wp.cw_mul(tb - ta, material.size), wp.cw_mul(tc - ta, material.size)
+        det = d1[0] * d2[1] - d2[0] * d1[1]
+        along_v = wp.vec3(0.0, 0.0, 1.0)
+        if wp.abs(det) > 1.0e-9:
+            along_u = wp.normalize((e1 * d2[1] - e2 * d1[1]) / det)
+            along_v = wp.normalize((e2 * d1[0] - e1 * d2[0]) / det)
+            du, dv = 1.0 / float(texture.shape[1]), 1.0 / float(texture.shape[0])
+            slope_u = (_texel(texture, uv[0] + du, uv[1])[3] - texel[3]) / (du * material.size[0])
+            slope_v = (_texel(texture, uv[0], uv[1] + dv)[3] - texel[3]) / (dv * material.size[1])
+            normal = wp.normalize(normal - along_u * slope_u - along_v * slope_v)
+
+        # turned by a different angle at every sample, so that 8 taps make no bands
+        spin = 6.2831853 * wp.frac(0.7548777 * float(column) + 0.5698403 * float(row))
+        key = _keyshare_array(light, shadow, point + normal * SHADOW_BIAS_METRES, spin)
+        open_share = openness[row // samples, column // samples]
+        upward = 0.5 + 0.5 * normal[2]
+        incoming = (light.ground * (1.0 - upward) + light.sky * upward) * open_share
+        highlight = wp.vec3(0.0, 0.0, 0.0)
+        wrap = WRAP_TINT * material.translucency
+        one = wp.vec3(1.0, 1.0, 1.0)
+        for k in range(light.lamps):
+            toward = light.toward[k]
+            seen = wp.where(k == 0, key, open_share)
+            cosine = wp.dot(normal, toward)
+            bent = wp.cw_div(one * cosine + wrap, one + wrap)
+            bent = wp.vec3(wp.max(bent[0], 0.0), wp.max(bent[1], 0.0), wp.max(bent[2], 0.0))
+            incoming += wp.cw_mul(light.colour[k], bent) * seen
+            if material.gloss > 0.0 and cosine > -0.2:
+                half = wp.normalize(toward + view)
+                shine = wp.max(wp.dot(normal, half), 0.0)
+                if material.sheen_along_v != 0:
+                    across = wp.dot(along_v, half)
+                    shine = wp.sqrt(wp.max(1.0 - across * across, 0.0))
+                strength = material.gloss * seen * wp.clamp(cosine * 3.0 + 0.6, 0.0, 1.0)
+                highlight += light.colour[k] * (strength * wp.pow(shine, material.sharpness))
+        result = wp.cw_mul(albedo, incoming) + highlight
+    share = 1.0 / float(samples * samples)
+    value = wp.vec4(result[0] * share, result[1] * share, result[2] * share, share)
+    wp.atomic_add(colour, row // samples, column // samples, value)
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Pieces seen by a camera.
+
+    Attributes:
+        colour: H x W x 3 linear RGB, multiplied by the coverage.
+        coverage: H x W, share of each pixel that the person covers, in steps of 1 / SAMPLES^2.
+    """
+
+    colour: Float32[np.ndarray, "H W 3"]
+    coverage: Float32[np.ndarray, "H W"]
+
+
+def shade(
+    pieces: Sequence[Piece],
+    body: PosedBody,
+    camera: Camera,
+    light: Light | None,
+) -> Shading:
+    """Draw pieces; without a light, each shows its bare colour."""
+    points = [piece.posed(body) for piece in pieces]
+    fine = camera.scaled(SAMPLES)
+    layers = [
+        Layer(fine.project(p), piece.faces, piece.keep, cull=not piece.two_sided)
+        for piece, p in zip(pieces, points, strict=True)
+    ]
+    nearest = rasterise(layers, fine.width, fine.height)
+    shadow_map, lamp = _light_input(light, camera, pieces, points)
+    openness = _openness(nearest, fine, light)
+    out = wp.zeros((camera.height, camera.width), dtype=wp.vec4, device="cpu")
+    first_id = 0
+    for piece, layer, moved in zip(pieces, layers, points, strict=True):
+        inputs = [
+            share_array(nearest, wp.uint64),
+            first_id,
+            share_array(layer.screen, wp.vec3),
+            share_array(moved, wp.vec3),
+            share_array(vertex_normals(moved, piece.faces), wp.vec3),
+            share_array(piece.faces, wp.vec3i),
+            share_array(piece.corner_uv, wp.vec2),
+            share_array(piece.material.texture, wp.vec4),
+            _material_input(piece),
+            lamp,
+            share_array(shadow_map, wp.float32),
+            share_array(openness, wp.float32),
+            SAMPLES,
+        ]
+        wp.launch(_shade, (fine.height, fine.width), inputs=inputs, outputs=[out], device="cpu")
+        first_id += len(piece.faces)
+    rgba = out.numpy()
+    return Shading(rgba[..., :3], rgba[..., 3])
+
+
+def vertex_normals(points: Points, faces: Faces) -> Float32[np.ndarray, "V 3"]:
+    """Sums of the normals of the triangles around each vertex, weighted by area; not unit."""
+    normals = wp.zeros(len(points), dtype=wp.vec3, device="cpu")
+    inputs = [share_array(points, wp.vec3), share_array(faces, wp.vec3i)]
+    wp.launch(_add_normals, len(faces), inputs=inputs, outputs=[normals], device="cpu")
+    return normals.numpy()
+
+
+def _material_input(piece: Piece) -> MaterialInput:
+    made = MaterialInput()
+    made.size = wp.vec2(*piece.material.size_metres)
+    made.gloss = piece.material.gloss
+    made.sharpness = piece.material.sharpness
+    made.translucency = piece.material.translucency
+    made.sheen_along_v = int(piece.material.sheen_along_v)
+    return made
+
+
+def _light_input(
+    light: Light | None, camera: Camera, pieces: Sequence[Piece], points: Sequence[Points]
+) -> tuple[Float32[np.ndarray, "S S"], LightInput]:
+    """The shadow map (depth from the key lamp) and everything that shading needs of the light."""
+    made = LightInput()
+    made.camera = wp.vec3(*camera.position)
+    made.lit = int(light is not None)
+    if light is None:
+        return np.zeros((1, 1), np.float32), made
+    black = (0.0, 0.0, 0.0)
+    lamps = [*light.lamps, *[None] * 3][:3]
+    made.toward = wp.mat33(*[x for lamp in lamps for x in (lamp.toward if lamp else black)])
+    made.colour = wp.mat33(*[x for lamp in lamps for x in (lamp.colour if lamp else black)])
+    made.lamps = len(light.lamps)
+    made.sky, made.ground = wp.vec3(*light.sky), wp.vec3(*light.ground)
+
+    rows = shadow_rows(light, points)
+    made.shadow_x, made.shadow_y, made.shadow_z = (wp.vec4(*row) for row in rows)
+    made.softness_px = light.softness_metres * float(np.linalg.norm(rows[0, :3]))
+    layers = [
+        Layer(p @ rows[:, :3].T + rows[:, 3], piece.faces, piece.keep, cull=False)
+        for piece, p in zip(pieces, points, strict=True)
+    ]
+    seen = rasterise(layers, SHADOW_SIZE, SHADOW_SIZE)
+    shadow = np.where(seen == EMPTY, np.float32(1e9), depths(seen))
+    return shadow.reshape(SHADOW_SIZE, SHADOW_SIZE), made
+
+
+def shadow_rows(light: Light, points: Sequence[Points]) -> Float32[np.ndarray, "3 4"]:
+    """Rows that take (x, y, z, 1) to shadow-map column, row and depth from the key lamp."""
+    into = -np.array(light.lamps[0].toward)
+    right = np.cross([0.0, 0.0, 1.0], into)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(into, right), into])
+    placed = np.concatenate([p[::8] for p in points]) @ axes.T
+    low, high = placed.min(0), placed.max(0)
+    scale = 0.94 * SHADOW_SIZE / float((high - low)[:2].max())
+    middle = (low + high) / 2
+    rows = np.empty((3, 4))
+    rows[:2, :3] = scale * axes[:2]
+    rows[:2, 3] = SHADOW_SIZE / 2 - scale * middle[:2]
+    rows[2, :3], rows[2, 3] = into, 1.0 - low[2]
+    return rows.astype(np.float32)
+
+
+def _openness(
+    nearest: UInt64[np.ndarray, " N"], fine: Camera, light: Light | None
+) -> Float32[np.ndarray, "H W"]:
+    """How freely light reaches each pixel, 0..1: less where the neighbourhood is nearer.
+
+    Source: T. Luft, C. Colditz, O. Deussen, "Image enhancement by unsharp masking the depth
+    buffer", SIGGRAPH 2006; here at two scales.
+    """
+    size = (fine.height // SAMPLES, fine.width // SAMPLES)
+    if light is None:
+        return np.ones(size, np.float32)
+    grid = nearest.reshape(fine.height, fine.width)[SAMPLES // 2 :: SAMPLES, SAMPLES // 2 :: SAMPLES]
+    seen = (grid != EMPTY).astype(np.float32)
+    depth = np.where(grid != EMPTY, depths(grid), np.float32(0))
+    openness = np.ones(size, np.float32)
+    metre_px = fine.focal_px / SAMPLES / fine.distance
+    for radius in OCCLUSION_RADII_METRES:
+        around = _blur(depth, radius * metre_px) / np.maximum(_blur(seen, radius * metre_px), 1e-3)
+        behind = np.clip((depth - around) / (1.5 * radius) - OCCLUSION_THRESHOLD, 0, 1)
+        openness *= 1 - 0.7 * light.occlusion * behind
+    return openness
+
+
+def _blur(image: Float32[np.ndarray, "H W"], sigma: float) -> Float32[np.ndarray, "H W"]:
+    """A Gaussian blur, on a coarser grid where it is wide."""
+    step = max(1, int(sigma / 2))
+    if step == 1:
+        return cv2.GaussianBlur(image, (0, 0), max(sigma, 0.6))
+    height, width = image.shape
+    coarse = cv2.resize(image, (width // step, height // step), interpolation=cv2.INTER_AREA)
+    coarse = cv2.GaussianBlur(coarse, (0, 0), sigma / step)
+    return cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
