@@ -75,7 +75,7 @@ class SkinWeights:
         blended = (self.matrix @ transforms.reshape(-1, 12)).reshape(-1, 3, 4)
         moved = np.einsum("vij,vj->vi", blended[..., :3], points)
         moved += blended[..., 3]
-        return moved
+        return moved.astype(np.float32, copy=False)
 
 
 @dataclass(frozen=True)

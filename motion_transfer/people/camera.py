@@ -41,7 +41,7 @@ class Camera:
         right = np.array([ca, sa, 0.0])
         down = np.cross(into, right)
         cr, sr = np.cos(self.roll), np.sin(self.roll)
-        return np.stack([cr * right + sr * down, cr * down - sr * right, into])
+        return np.stack([cr * right - sr * down, cr * down + sr * right, into])
 
     @property
     def position(self) -> Float64[np.ndarray, "3"]:

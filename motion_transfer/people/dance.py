@@ -53,7 +53,7 @@ def _side_lunge() -> Pose:
         Foot(0.08, 0.28, turn_out=0.5), Foot(0.0, 0.5, turn_out=0.2), pelvis, sink=0.03
     )
     return Pose(
-        left_arm=_arm(-12, 56, -66, 84, pronation=-10, wrist=-30, curl=0.3),
+        left_arm=_arm(14, 74, -8, 92, pronation=15, wrist=10, curl=0.3),
         right_arm=_arm(12, 142, 20, 8, pronation=10),
         left_leg=left,
         right_leg=right,
@@ -117,11 +117,11 @@ def _close() -> Pose:
     """Low, with arms crossed in front, before a throw."""
     pelvis = _bend(16, 0, 0)
     left, right = stance(
-        Foot(0.05, 0.08, turn_out=0.4), Foot(0.05, 0.08, turn_out=0.4), pelvis, sink=0.1
+        Foot(0.05, 0.08, turn_out=0.4), Foot(0.05, 0.08, turn_out=0.4), pelvis, sink=0.08
     )
     return Pose(
-        left_arm=_arm(48, -2, -48, 70, pronation=10, curl=0.5),
-        right_arm=_arm(28, 2, -48, 62, pronation=10, curl=0.5),
+        left_arm=_arm(62, 0, -40, 62, pronation=10, curl=0.5),
+        right_arm=_arm(26, 8, -44, 58, pronation=10, curl=0.5),
         left_leg=left,
         right_leg=right,
         pelvis=pelvis,

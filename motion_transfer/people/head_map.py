@@ -67,7 +67,6 @@ class _Chart:
     lookup: csr_array
     weight: Float32[np.ndarray, "rows columns 1"]
     place: Float32[np.ndarray, "rows columns 3"]
-    above: np.ndarray
 
 
 _CHARTS: WeakKeyDictionary[BodyModel, _Chart] = WeakKeyDictionary()
@@ -82,10 +81,9 @@ def head_map(body: Body, model: BodyModel) -> HeadMap:
     points = _smooth(points, chart.weight)
     down = np.gradient(points, axis=0)
     right = np.gradient(points, axis=1)
-    normals = np.cross(down, right)
-    # the outermost directions look down the neck
+    normals = np.cross(right, down)
     layers = np.concatenate([points, normals, chart.place], 2).astype(np.float32)
-    return HeadMap(np.ascontiguousarray(layers), points[SIZE // 2, SIZE // 2] * 0 + _middle(body, model))
+    return HeadMap(np.ascontiguousarray(layers), _middle(body, model))
 
 
 def _middle(body: Body, model: BodyModel) -> Float32[np.ndarray, "3"]:
@@ -105,7 +103,8 @@ def _smooth(points: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Fill in the ears from around them; soften all a little."""
     spread = cv2.GaussianBlur(weight, (0, 0), 4.0)[..., None]
     filled = cv2.GaussianBlur(points * weight, (0, 0), 4.0) / np.maximum(spread, 1e-4)
-    return cv2.GaussianBlur(points * weight + filled * (1 - weight), (0, 0), 1.0)
+    own = np.clip(2 * cv2.GaussianBlur(weight, (0, 0), 1.5) - 1, 0, 1)[..., None]
+    return cv2.GaussianBlur(points * own + filled * (1 - own), (0, 0), 1.0)
 
 
 def _chart(model: BodyModel) -> _Chart:
@@ -138,7 +137,7 @@ def _chart(model: BodyModel) -> _Chart:
     ear = (x > 0.070) & (y > -0.076) & (y < -0.018) & (z > 1.662) & (z < 1.738)
     ear = cv2.dilate(ear.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     weight = (known.reshape(SIZE, SIZE) & ~ear).astype(np.float32)[..., None]
-    return _Chart(lookup, weight, _smooth(place, weight).astype(np.float32), known)
+    return _Chart(lookup, weight, _smooth(place, weight).astype(np.float32))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -8,9 +8,11 @@ to ankle). Everything is JSON-able through `dataclasses.asdict`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from motion_transfer.people.fabrics import Colour, Fabric
-from motion_transfer.people.prints import Print
+if TYPE_CHECKING:
+    from motion_transfer.people.prints import Print
 
 
 @dataclass(frozen=True)

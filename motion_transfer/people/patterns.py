@@ -7,6 +7,7 @@ smooth it, flat panels, and maps that tell for each texel of a panel where on th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float32
@@ -14,31 +15,11 @@ from scipy.sparse import csr_array, diags_array, eye_array
 
 from motion_transfer.people import flattening as flat
 from motion_transfer.people.body import Faces, Points, SkinWeights
+from motion_transfer.people.cuts import Places
 from motion_transfer.people.surface import BodySurface, Limb, along_polyline
 
 TEXELS_PER_METRE = 330.0
 _FRONT_TO_BACK = -0.02  # y of the seam on the shoulders and at the sides
-
-
-@dataclass(frozen=True)
-class Places:
-    """Where on the body each texel of the panels lies, all H x W.
-
-    Attributes:
-        x, y, z: on the template, metres.
-        arm, leg, below_neck: fields of `BodySurface`.
-        on_arm: 1 on sleeves, 0 elsewhere.
-        seam: distance to the panel's edge, metres; 0 beyond it.
-    """
-
-    x: Float32[np.ndarray, "H W"]
-    y: Float32[np.ndarray, "H W"]
-    z: Float32[np.ndarray, "H W"]
-    arm: Float32[np.ndarray, "H W"]
-    leg: Float32[np.ndarray, "H W"]
-    below_neck: Float32[np.ndarray, "H W"]
-    on_arm: Float32[np.ndarray, "H W"]
-    seam: Float32[np.ndarray, "H W"]
 
 
 @dataclass(frozen=True)
@@ -52,7 +33,8 @@ class Pattern:
         home: its vertices on the template.
         weights: of its vertices.
         charts: the panels, in metres.
-        places: what each texel is.
+        texels, vertices: where on the body texels (H x W) and vertices lie.
+        seam: how far inside its panel each texel lies, metres; 0 outside.
         smoother: V x V, one round of smoothing (half-way to the neighbours' mean).
         sums: V x F, sums triangles' normals.
         on_arm: V, which vertices are a sleeve's.
@@ -67,7 +49,9 @@ class Pattern:
     home: Points
     weights: SkinWeights
     charts: flat.Charts
-    places: Places
+    texels: Places
+    vertices: Places
+    seam: Float32[np.ndarray, "H W"]
     smoother: csr_array
     sums: csr_array
     on_arm: np.ndarray
@@ -109,7 +93,9 @@ def _pattern(
         home=points,
         weights=surface.model.weights.rows(index),
         charts=charts,
-        places=Places(*columns, seam=seam),
+        texels=Places(*columns),
+        vertices=Places(*(np.ascontiguousarray(column) for column in values.T)),
+        seam=seam,
         smoother=_smoother(surface, index),
         sums=flat.corner_sums(local, len(index)),
         on_arm=on_arm,
@@ -132,7 +118,7 @@ def _hangers(
     down = surface.armpit - surface.z[index]
     shares = {"trunk": np.where(arms, 0, _ramp(down, -0.01, 0.07)).astype(np.float32)}
     limbs = {}
-    along, start = (surface.arm_along, 0.03) if kind == "top" else (surface.leg_along, 0.08)
+    along, start = (surface.arm_along, 0.05) if kind == "top" else (surface.leg_along, 0.08)
     for side, sign in (("L", 1), ("R", -1)):
         name = f"{'arm' if kind == 'top' else 'leg'}.{side}"
         on_limb = arms if kind == "top" else surface.z[index] < surface.crotch + 0.08
@@ -143,6 +129,7 @@ def _hangers(
     return readers, limbs, shares
 
 
+@cache
 def top_pattern(surface: BodySurface) -> Pattern:
     """Trunk, neck and arms, from the crotch to the chin and the wrists."""
     inside = surface.is_limb(Limb.TORSO, Limb.ARM_L, Limb.ARM_R, Limb.NECK)
@@ -198,6 +185,7 @@ def _underarm(surface: BodySurface, faces: Faces) -> np.ndarray:
     return out
 
 
+@cache
 def bottom_pattern(surface: BodySurface) -> Pattern:
     """Hips and legs, from a hand above the waist to the ankles."""
     end = surface.template_lengths["leg"] + 0.015

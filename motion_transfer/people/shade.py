@@ -21,6 +21,10 @@ SAMPLES = 2
 
 SHADOW_SIZE = 256
 SHADOW_BIAS_METRES = 0.012
+SCATTER_METRES = 0.1
+LAMP_DISTANCE_METRES = 1000.0
+"""The rasteriser interpolates as a perspective does; from this far it is as good as parallel."""
+
 OCCLUSION_RADII_METRES = (0.03, 0.12)
 OCCLUSION_THRESHOLD = 0.12
 """A round surface is a little behind its own neighbourhood; that is no occlusion."""
@@ -316,14 +320,14 @@ def shadow_rows(light: Light, points: Sequence[Points]) -> Float32[np.ndarray, "
     right = np.cross([0.0, 0.0, 1.0], into)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(into, right), into])
-    placed = np.concatenate([p[::8] for p in points]) @ axes.T
+    placed = np.concatenate([p[:: 8 if len(p) > 1000 else 1] for p in points]) @ axes.T
     low, high = placed.min(0), placed.max(0)
-    scale = 0.94 * SHADOW_SIZE / float((high - low)[:2].max())
+    scale = 0.94 * SHADOW_SIZE / max(float((high - low)[:2].max()), 1e-3)
     middle = (low + high) / 2
     rows = np.empty((3, 4))
     rows[:2, :3] = scale * axes[:2]
     rows[:2, 3] = SHADOW_SIZE / 2 - scale * middle[:2]
-    rows[2, :3], rows[2, 3] = into, 1.0 - low[2]
+    rows[2, :3], rows[2, 3] = into, LAMP_DISTANCE_METRES - low[2]
     return rows.astype(np.float32)
 
 

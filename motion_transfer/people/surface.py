@@ -18,6 +18,7 @@ from scipy.sparse import csr_array, diags_array
 
 from motion_transfer.people.body import Body, BodyModel, Points
 from motion_transfer.people.flattening import corner_sums, vertex_normals
+from motion_transfer.people.cuts import Levels
 from motion_transfer.people.tubes import Tube
 
 Field = Float32[np.ndarray, " V"]
@@ -168,6 +169,12 @@ class BodySurface:
         return {kind: self.limb_length(self.model.template, kind) for kind in ("arm", "leg")}
 
     @cached_property
+    def levels(self) -> Levels:
+        """Heights and lengths that garments are cut by."""
+        lengths = self.template_lengths
+        return Levels(self.crotch, self.waist, self.armpit, lengths["arm"], lengths["leg"])
+
+    @cached_property
     def torso_tube(self) -> Tube:
         """Around the trunk from the armpits (level 0) down past the crotch."""
         where = self.is_limb(Limb.TORSO, Limb.LEG_L, Limb.LEG_R)
@@ -195,7 +202,7 @@ class BodySurface:
         """Around arms ("arm.L", ...) from 4 cm and legs ("leg.L", ...) from the crotch down."""
         out = {}
         body = self.model.template
-        for kind, start in (("arm", 0.04), ("leg", 0.10)):
+        for kind, start in (("arm", 0.09), ("leg", 0.10)):
             along = self.arm_along if kind == "arm" else self.leg_along
             end = self.template_lengths[kind]
             for side, sign in (("L", 1), ("R", -1)):

@@ -1,0 +1,140 @@
+"""Lets strands of hair fall: along the body's skin where they meet it, straight down where not.
+
+A strand is marched from its root, one step at a time and all strands at once: each step goes on in
+the strand's direction, turned towards the ground, and is pushed out of the nearest skin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from jaxtyping import Float32
+from scipy.spatial import cKDTree
+
+from motion_transfer.people.body import BodyModel, SkinWeights
+from motion_transfer.people.mesh import PosedBody
+from motion_transfer.people.skin_atlas import components, vertex_normals
+
+Strands = Float32[np.ndarray, "steps strands 3"]
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """The skin that hair can meet: the head's lower part, neck, shoulders, upper arms and torso.
+
+    Attributes:
+        index: of the body's vertices.
+        weights: of those.
+        torso: index of the bone whose frame tells front from back.
+        neck: index of the bone at the nape.
+    """
+
+    index: np.ndarray
+    weights: SkinWeights
+    torso: int
+    neck: int
+
+
+_OBSTACLES: WeakKeyDictionary[BodyModel, Obstacle] = WeakKeyDictionary()
+
+
+def obstacle(model: BodyModel) -> Obstacle:
+    """The vertices that stand for the skin, evenly spread; chosen once a model."""
+    found = _OBSTACLES.get(model)
+    if found is not None:
+        return found
+    points, names = model.template.points, model.skeleton.names
+    part = components(model.faces, len(points)) == 0
+    starts = ("head", "neck", "clavicle", "shoulder", "upperarm", "spine")
+    bones = np.flatnonzero([name.startswith(starts) for name in names])
+    share = np.asarray(model.weights.matrix[:, bones].sum(1)).ravel()
+    ear = (np.abs(points[:, 0]) > 0.078) & (points[:, 2] > 1.66)
+    wanted = np.flatnonzero(part & (share > 0.6) & (points[:, 2] < 1.80) & ~ear)
+    normals = vertex_normals(points, model.faces)
+    middle = points[wanted] - [0, -0.05, 0]
+    outward = (normals[wanted] * middle)[:, :2].sum(1) + 0.05 * normals[wanted, 2] > -0.02
+    wanted = wanted[outward]
+    # one vertex a cell: the face is much finer than hair needs
+    cell = np.where(points[wanted, 2:] > 1.60, 0.014, 0.020)
+    _, first = np.unique(np.floor(points[wanted] / cell).astype(int), axis=0, return_index=True)
+    index = np.sort(wanted[first])
+    found = Obstacle(
+        index, model.weights.rows(index), names.index("spine01"), names.index("neck02")
+    )
+    _OBSTACLES[model] = found
+    return found
+
+
+@dataclass(frozen=True)
+class Fall:
+    """How strands hang.
+
+    Attributes:
+        step: metres from one point of each strand to its next, one for each strand.
+        steps: points of a strand after its root.
+        clear: metres between skin and hair, one for each strand.
+        front: one for each strand: -1 falls behind the shoulder, 1 in front of it.
+        stiffness: how much of its direction a strand keeps a step, 0 .. 1.
+        inward: how much the ends turn in (a bob) or, if negative, flip out.
+    """
+
+    step: Float32[np.ndarray, " strands"]
+    steps: int
+    clear: Float32[np.ndarray, " strands"]
+    front: Float32[np.ndarray, " strands"]
+    stiffness: float = 0.55
+    inward: float = 0.0
+
+
+def drape(
+    roots: Float32[np.ndarray, "strands 3"],
+    directions: Float32[np.ndarray, "strands 3"],
+    fall: Fall,
+    skin: Obstacle,
+    normals: Float32[np.ndarray, "V 3"],
+    posed: PosedBody,
+) -> Strands:
+    """March strands from their roots.
+
+    Args:
+        directions: unit; in which each strand leaves its root.
+        normals: of the body's rest pose.
+    Returns: the points after the roots.
+    """
+    points = posed.points[skin.index]
+    turned = (skin.weights.matrix @ posed.transforms[:, :, :3].reshape(-1, 9)).reshape(-1, 3, 3)
+    outward = np.einsum("vij,vj->vi", turned, normals[skin.index])
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-6)
+    tree = cKDTree(points)
+    torso = posed.transforms[skin.torso]
+    forward = -torso[:, 1]  # the person faces -y at rest
+    neck = posed.joints[skin.neck].astype(np.float32)
+    clear = fall.clear
+    down = np.array([0, 0, -1], np.float32)
+    out = np.empty((fall.steps, len(roots), 3), np.float32)
+    at, way = roots, directions
+    touched = np.zeros(len(roots), np.float32)
+    for k in range(fall.steps):
+        ahead = (at - neck) @ forward
+        # on the shoulder hair slides to the side it is on, or to the one it prefers
+        side = np.tanh(ahead / 0.05 + 1.2 * fall.front)
+        pull = down + (0.06 * fall.front + 0.9 * touched * side)[:, None] * forward
+        late = fall.inward * max(0.0, (k + 1) / fall.steps - 0.5)
+        if late:
+            home = (neck - at) * np.array([1, 1, 0], np.float32)
+            pull = pull + late * home / np.maximum(np.linalg.norm(home, axis=1, keepdims=True), 1e-6)
+        way = fall.stiffness * way + (1 - fall.stiffness) * pull
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
+        new = at + fall.step[:, None] * way
+        for _ in range(2):
+            _, near = tree.query(new)
+            normal = outward[near]
+            depth = clear - ((new - points[near]) * normal).sum(1)
+            push = np.clip(depth, 0, None)
+            new = new + push[:, None] * normal
+        touched = np.where(depth > -0.004, np.clip(normal[:, 2] + 0.3, 0, 1), 0).astype(np.float32)
+        way = (new - at) / np.maximum(np.linalg.norm(new - at, axis=1, keepdims=True), 1e-6)
+        at = out[k] = new.astype(np.float32)
+    return out
