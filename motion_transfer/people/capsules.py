@@ -1,8 +1,8 @@
 """A body as seventeen capsules: quick to pose, quick to test for limbs that go through each other.
 
 A capsule is a segment with a radius that changes evenly along it. The torso's lie from side to
-side, because a torso is wider than deep. Radii are measured from the skin at rest; the body is taken
-as symmetric.
+side, because a torso is wider than deep. Radii are measured from the skin at rest; the body is
+taken as symmetric.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from motion_transfer.people.poses import (
 )
 
 Points = Float64[np.ndarray, "n 3"]
+Numbers = Float64[np.ndarray, "n"]
 
 TORSO = ("hips", "belly", "chest", "shoulders")
 TORSO_BONES = ("root", "spine04", "spine02", "spine01")
@@ -45,7 +46,7 @@ _SKIN = {
     "shin": ("lowerleg",),
     "foot": ("foot", "toe"),
 }
-_SPAN = {"upperarm": (0.45, 1.0), "thigh": (0.35, 1.0)}  # the part that can come free of the torso
+_SPAN = {"upperarm": 0.45, "thigh": 0.35}  # from where on they can come free of the torso
 
 
 def _tested() -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +98,7 @@ class Contacts:
         normals: from the second to the first.
     """
 
-    gaps: Float64[np.ndarray, "pairs"]
+    gaps: Numbers
     near: Points
     far: Points
     normals: Points
@@ -148,7 +149,7 @@ class Capsules:
         names = np.array(body.skeleton.names)[owner]
         points = body.points.astype(np.float64)
         for limb, (start, end) in segments.items():
-            low, high = _SPAN.get(limb, (0.0, 1.0))
+            low = _SPAN.get(limb, 0.0)
             skin = points[[n.endswith(".L") and n.startswith(_SKIN[limb]) for n in names]]
             radii = _radii(skin, start + low * (end - start), end)
             if limb in ("hand", "foot"):  # flat: between half the thickness and half the width
@@ -193,7 +194,7 @@ class Capsules:
             arm = arms[side] = base + arms[side] @ chest.T
             leg = legs[side] = hips[side] + legs[side] @ upright.T
             first = 5 + 6 * side
-            low = _SPAN["upperarm"][0], _SPAN["thigh"][0]
+            low = _SPAN["upperarm"], _SPAN["thigh"]
             segments[first] = arm[0] + low[0] * (arm[1] - arm[0]), arm[1]
             segments[first + 1], segments[first + 2] = arm[1:3], arm[2:4]
             segments[first + 3] = leg[0] + low[1] * (leg[1] - leg[0]), leg[1]
@@ -282,9 +283,7 @@ def _slab(skin: Points, height: float) -> tuple[np.ndarray, float]:
     return np.array([[half, middle, height], [-half, middle, height]]), float(radius)
 
 
-def _closest(
-    p: Points, d: Points, q: Points, e: Points
-) -> tuple[Float64[np.ndarray, "n"], Float64[np.ndarray, "n"]]:
+def _closest(p: Points, d: Points, q: Points, e: Points) -> tuple[Numbers, Numbers]:
     """Where along segments p + s d and q + t e they are closest, s and t in [0, 1].
 
     Source: Ericson, Real-Time Collision Detection (2005), Sec. 5.1.9.

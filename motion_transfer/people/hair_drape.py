@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float32
 from scipy.spatial import cKDTree
 
-from motion_transfer.people.body import BodyModel, SkinWeights
+from motion_transfer.people.body import Body, BodyModel, Faces, Points, SkinWeights
 from motion_transfer.people.mesh import PosedBody
 from motion_transfer.people.skin_atlas import components, vertex_normals
 
@@ -27,12 +27,14 @@ class Obstacle:
     Attributes:
         index: of the body's vertices.
         weights: of those.
+        faces: all triangles around them.
         torso: index of the bone whose frame tells front from back.
         neck: index of the bone at the nape.
     """
 
     index: np.ndarray
     weights: SkinWeights
+    faces: Faces
     torso: int
     neck: int
 
@@ -60,8 +62,9 @@ def obstacle(model: BodyModel) -> Obstacle:
     cell = np.where(points[wanted, 2:] > 1.60, 0.014, 0.020)
     _, first = np.unique(np.floor(points[wanted] / cell).astype(int), axis=0, return_index=True)
     index = np.sort(wanted[first])
+    around = model.faces[np.isin(model.faces, index).any(1)]
     found = Obstacle(
-        index, model.weights.rows(index), names.index("spine01"), names.index("neck02")
+        index, model.weights.rows(index), around, names.index("spine01"), names.index("neck02")
     )
     _OBSTACLES[model] = found
     return found
@@ -88,24 +91,29 @@ class Fall:
     inward: float = 0.0
 
 
+def rest_normals(body: Body, skin: Obstacle) -> Points:
+    """Outward normals of the obstacle's vertices at rest."""
+    return vertex_normals(body.points, skin.faces)[skin.index]
+
+
 def drape(
     roots: Float32[np.ndarray, "strands 3"],
     directions: Float32[np.ndarray, "strands 3"],
     fall: Fall,
     skin: Obstacle,
-    normals: Float32[np.ndarray, "V 3"],
+    normals: Points,
     posed: PosedBody,
 ) -> Strands:
     """March strands from their roots.
 
     Args:
         directions: unit; in which each strand leaves its root.
-        normals: of the body's rest pose.
+        normals: of the obstacle's vertices at rest, see `rest_normals`.
     Returns: the points after the roots.
     """
     points = posed.points[skin.index]
     turned = (skin.weights.matrix @ posed.transforms[:, :, :3].reshape(-1, 9)).reshape(-1, 3, 3)
-    outward = np.einsum("vij,vj->vi", turned, normals[skin.index])
+    outward = np.einsum("vij,vj->vi", turned, normals)
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-6)
     tree = cKDTree(points)
     torso = posed.transforms[skin.torso]

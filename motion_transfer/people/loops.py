@@ -21,7 +21,7 @@ class Loop:
 
     @classmethod
     def through(
-        cls, phases: Sequence[float], rows: np.ndarray, gain: np.ndarray | float = 0.0
+        cls, phases: Sequence[float] | np.ndarray, rows: np.ndarray, gain: np.ndarray | float = 0.0
     ) -> Loop:
         """Args: phases, rising in [0, 1); rows, one each; gain, what a cycle adds to a row."""
         x = np.concatenate([np.asarray(phases) + cycle for cycle in (-1, 0, 1)])

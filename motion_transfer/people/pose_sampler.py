@@ -72,24 +72,24 @@ def _even(rng: Rng) -> Pose:
     out, toes = rng.uniform(-0.05, 0.1), _between(rng, 2, 20)
     left = Foot(rng.uniform(-0.04, 0.04), out, 0.0, toes)
     right = Foot(rng.uniform(-0.04, 0.04), out, 0.0, toes + _normal(rng, 0, 3))
-    legs = stance(left, right, pelvis, sink=rng.uniform(0.0005, 0.004))
+    legs = stance(left, right, pelvis, sink=rng.uniform(0.0, 0.0015))
     return Pose(left_leg=legs[0], right_leg=legs[1], pelvis=pelvis, spine=_bend(rng, 3, 2, 4))
 
 
 def _contrapposto(rng: Rng) -> Pose:
-    """The weight on the left leg: that hip is high, the shoulder over it low, the other knee soft."""
-    tilt = _between(rng, 4, 11)
+    """The weight on the left leg: hip high and shoulder low on that side, the other knee soft."""
+    tilt = _between(rng, 3, 8)
     pelvis = Bend(_normal(rng, 3, 2), -tilt, _normal(rng, 0, 5))
     shift = rng.uniform(0.02, 0.09)
     left = Foot(0.0, -shift, 0.0, _between(rng, 3, 18))
     right = Foot(
-        rng.uniform(-0.05, 0.2),
+        rng.uniform(-0.04, 0.13),
         shift + rng.uniform(-0.08, 0.1),
-        _between(rng, 0, 25) if rng.random() < 0.5 else 0.0,
-        _between(rng, 5, 40),
+        _between(rng, 0, 20) if rng.random() < 0.35 else 0.0,
+        _between(rng, 5, 35),
     )
-    legs = stance(left, right, pelvis, sink=0.001)
-    spine = Bend(_normal(rng, 0, 3), tilt * rng.uniform(1.0, 1.6), _normal(rng, 0, 6))
+    legs = stance(left, right, pelvis)
+    spine = Bend(_normal(rng, 0, 3), tilt * rng.uniform(1.0, 1.5), _normal(rng, 0, 6))
     return Pose(left_leg=legs[0], right_leg=legs[1], pelvis=pelvis, spine=spine)
 
 
@@ -109,7 +109,7 @@ def _wide(rng: Rng) -> Pose:
     out = rng.uniform(0.12, 0.3)
     left = Foot(rng.uniform(-0.1, 0.1), out, 0.0, _between(rng, 8, 30))
     right = Foot(rng.uniform(-0.1, 0.1), out, 0.0, _between(rng, 8, 30))
-    legs = stance(left, right, pelvis, sink=rng.uniform(0.002, 0.02))
+    legs = stance(left, right, pelvis, sink=rng.uniform(0.0, 0.01))
     return Pose(left_leg=legs[0], right_leg=legs[1], pelvis=pelvis, spine=_bend(rng, 4, 4, 6))
 
 
@@ -195,12 +195,21 @@ def _on_chair(rng: Rng) -> Pose:
     return replace(_arms(rng, pose, left, right), head=_bend(rng, 6, 5, 16))
 
 
+def _knee_up(knee: float) -> Leg:
+    """A bent leg whose sole is on the floor that the person sits on.
+
+    The hip joint is 0.05 legs higher above the floor than a flat foot's ankle.
+    """
+    hip = knee / 2 + np.arccos(0.05 / (2 * np.cos(knee / 2)))
+    return Leg(float(hip), 0.12, 0.05, knee, float(knee - hip))
+
+
 def _on_floor(rng: Rng) -> Pose:
     shape = rng.integers(4)
-    if shape == 0:  # cross-legged
+    if shape == 0:  # cross-legged, solved for: shins crossed but apart, near the floor
         legs = [
-            Leg(hip, _between(rng, 40, 50), _between(rng, 38, 50), _between(rng, 118, 130), -0.3)
-            for hip in (_between(rng, 72, 80), _between(rng, 62, 70))
+            Leg(_normal(rng, hip, 1), np.radians(out), np.radians(59), np.radians(knee), -0.35)
+            for hip, out, knee in ((113, 36, 113), (114, 39, 136))
         ]
     elif shape == 1:  # legs out in front, one knee up perhaps
         legs = [
@@ -214,16 +223,12 @@ def _on_floor(rng: Rng) -> Pose:
             for _ in "LR"
         ]
         if rng.random() < 0.6:
-            knee = _between(rng, 70, 115)
-            legs[0] = Leg(np.radians(90) + 0.42 * knee - 0.25, 0.1, 0.05, knee, 0.0)
+            legs[0] = _knee_up(_between(rng, 60, 105))
     elif shape == 2:  # knees up
-        knee = _between(rng, 95, 125)
-        legs = [
-            Leg(min(np.radians(90) + 0.42 * knee - 0.3, np.radians(119)), 0.12, 0.05, knee, -0.1)
-            for _ in "LR"
-        ]
+        knee = _between(rng, 70, 105)
+        legs = [_knee_up(knee), _knee_up(knee + _normal(rng, 0, 3))]
     else:  # on the heels
-        hip = _between(rng, 62, 72)
+        hip = _between(rng, 46, 52)
         legs = [Leg(hip, _between(rng, 4, 14), 0.0, np.radians(138), np.radians(-48)) for _ in "LR"]
     leaning = shape in (1, 2) and rng.random() < 0.5
     pelvis = Bend(_normal(rng, -18, 3) if leaning else _normal(rng, -8, 4))

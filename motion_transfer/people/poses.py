@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, Float64
@@ -18,6 +19,7 @@ from motion_transfer.people.limbs import (
     Bones,
     Matrix,
     Rest,
+    Vector,
     arm_bones,
     both_sides,
     finger_bones,
@@ -27,6 +29,9 @@ from motion_transfer.people.limbs import (
     spine_bones,
     turned,
 )
+
+Row = Float64[np.ndarray, "numbers"]
+Shift = Float32[np.ndarray, "3"]
 
 RELAXED, FIST, OPEN = 0.3, 1.0, 0.0
 """Finger curls."""
@@ -148,7 +153,7 @@ LIMITS: dict[str, dict[str, tuple[float, float]]] = {
         "curl": (0.0, 1.0),
     },
     "leg": {
-        "hip": _degrees(-30, 120),  # extension, flexion
+        "hip": _degrees(-40, 145),  # AAOS -30, 120 against the pelvis, which can tilt along
         "out": _degrees(-30, 60),  # adduction; abduction AAOS 45, more in a dancer with hips turned
         "turn_out": _degrees(
             -45, 60
@@ -163,8 +168,8 @@ LIMITS: dict[str, dict[str, tuple[float, float]]] = {
     "spine": {"forward": _degrees(-25, 80), "side": _degrees(-35, 35), "turn": _degrees(-45, 45)},
     "head": {"forward": _degrees(-45, 45), "side": _degrees(-45, 45), "turn": _degrees(-70, 70)},
 }
-"""Lowest and highest angle of each joint: the American Academy of Orthopaedic Surgeons' normal ranges
-of motion (Joint Motion: Method of Measuring and Recording, 1965) except where a line says so."""
+"""Lowest and highest angle of each joint: the American Academy of Orthopaedic Surgeons' normal
+ranges of motion (Joint Motion: Method of Measuring and Recording, 1965) unless a line says more."""
 
 
 def limits_of(part: str) -> dict[str, tuple[float, float]]:
@@ -193,17 +198,19 @@ def clamped(pose: Pose) -> Pose:
     return replace(pose, **changes)
 
 
-def numbers(pose: Pose) -> Float64[np.ndarray, "numbers"]:
+def numbers(pose: Pose) -> Row:
     """A pose as one row, for interpolation; `touches` is not in it."""
     rows = [getattr(getattr(pose, part), f.name) for part in PARTS for f in fields(_KINDS[part])]
     return np.array([pose.turn, *pose.offset, *rows])
 
 
-def from_numbers(row: Float64[np.ndarray, "numbers"]) -> Pose:
+def from_numbers(row: Row) -> Pose:
     """The way back from `numbers`."""
     values = iter(row.tolist())
     turn, offset = next(values), (next(values), next(values), next(values))
-    parts = {part: _KINDS[part](*(next(values) for _ in fields(_KINDS[part]))) for part in PARTS}
+    parts: dict[str, Any] = {
+        part: _KINDS[part](*(next(values) for _ in fields(_KINDS[part]))) for part in PARTS
+    }
     return Pose(turn=turn, offset=offset, **parts)
 
 
@@ -294,7 +301,7 @@ def _leg(leg: Leg, rest: Rest, pelvis: Matrix) -> Bones:
     return leg_bones(rest, thigh, chain @ rest.leg, foot, leg.toes)
 
 
-def _vector(bend: Bend) -> Float64[np.ndarray, "3"]:
+def _vector(bend: Bend) -> Vector:
     return np.array([bend.forward, bend.side, bend.turn])
 
 
@@ -320,7 +327,7 @@ def pose_rotations(pose: Pose, body: Body) -> Bones:
     return rotations_at(pose, Rest.of(body))
 
 
-def placed(points: Float32[np.ndarray, "V 3"], pose: Pose) -> Float32[np.ndarray, "3"]:
+def placed(points: Float32[np.ndarray, "V 3"], pose: Pose) -> Shift:
     """The shift that puts posed points where the pose wants them: add it to all that is drawn.
 
     Args:

@@ -103,7 +103,7 @@ def _texel(texture: wp.array2d(dtype=wp.vec4), u: float, v: float):
 
 
 @wp.func
-def _keyshare_array(
+def _key_share(
     light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: float
 ):
     """How much of the key lamp a point sees, from 8 places of a disc in the shadow map."""
@@ -187,7 +187,10 @@ def _shade(
 
         # turned by a different angle at every sample, so that 8 taps make no bands
         spin = 6.2831853 * wp.frac(0.7548777 * float(column) + 0.5698403 * float(row))
-        key = _keyshare_array(light, shadow, point + normal * SHADOW_BIAS_METRES, spin)
+        # light that scatters in flesh gets around its own edge
+        inside = light.toward[0] * (material.translucency * SCATTER_METRES)
+        outside = point + normal * SHADOW_BIAS_METRES + inside
+        key = _key_share(light, shadow, outside, spin)
         open_share = openness[row // samples, column // samples]
         upward = 0.5 + 0.5 * normal[2]
         incoming = (light.ground * (1.0 - upward) + light.sky * upward) * open_share

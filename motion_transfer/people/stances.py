@@ -1,7 +1,7 @@
 """Legs from where the feet stand, so that both reach the floor.
 
-Convention: lengths in legs (hip to ankle, straight = 1), so that a stance fits every body; thigh and
-shin count as equally long. A foot is given relative to the place under its hip joint.
+Convention: lengths in legs (hip to ankle, straight = 1), so that a stance fits every body;
+thigh and shin count as equally long. A foot is given relative to the place under its hip joint.
 """
 
 from __future__ import annotations

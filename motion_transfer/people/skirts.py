@@ -1,0 +1,263 @@
+"""Skirts, and the lower parts of dresses, coats and tunics: tubes of their own that hang.
+
+A skirt is a grid of rows (down) and columns (around). At rest it stands off hips and spread legs;
+posed, it follows pelvis and thighs, and is then pushed out of the legs and drawn taut over them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from jaxtyping import Float32
+from scipy.sparse import csr_array
+
+from motion_transfer.people.body import Faces, Points, SkinWeights
+from motion_transfer.people.cuts import ramp
+from motion_transfer.people.fit import Fitting
+from motion_transfer.people.mesh import PosedBody
+from motion_transfer.people.outfits import Skirt
+from motion_transfer.people.surface import BodySurface, along_polyline
+from motion_transfer.people.tubes import ANGLES, bridged
+
+COLUMNS = 48
+ROWS = 26
+_CLEARANCE = 0.006  # metres between legs and cloth
+_RINGS = (0, 3, 6, 9, 12, 15)  # rows of a leg's table that bound the cones standing for the leg
+Grid = Float32[np.ndarray, "rows columns"]
+
+
+@dataclass(frozen=True)
+class SkirtShape:
+    """A skirt at rest.
+
+    Attributes:
+        points: ROWS * COLUMNS x 3, row by row from the top.
+        outward: unit vectors away from the axis, the same order.
+        weights: how the bones move them.
+        down: ROWS, metres along the cloth from the upper edge.
+        around: mean circumference, metres.
+    """
+
+    points: Points
+    outward: Points
+    weights: SkinWeights
+    down: Float32[np.ndarray, " rows"]
+    around: float
+
+
+@cache
+def grid_faces(rows: int, columns: int) -> Faces:
+    """Triangles of a tube seen from outside; column 0 closes on the last one."""
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    a, b = r * columns + c, r * columns + (c + 1) % columns
+    below_a, below_b = a + columns, b + columns
+    upper, lower = np.stack([a, below_b, b], -1), np.stack([a, below_a, below_b], -1)
+    return np.stack([upper, lower], 2).reshape(-1, 3).astype(np.int32)
+
+
+@cache
+def grid_uv(rows: int, columns: int) -> np.ndarray:
+    """Texture coordinates of `grid_faces`: u once around, v from top to bottom; F x 3 x 2."""
+    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    u0, u1 = c / columns, (c + 1) / columns
+    v0, v1 = r / (rows - 1), (r + 1) / (rows - 1)
+
+    def corner(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.stack([u, v], -1)
+
+    upper = np.stack([corner(u0, v0), corner(u1, v1), corner(u1, v0)], 2)
+    lower = np.stack([corner(u0, v0), corner(u0, v1), corner(u1, v1)], 2)
+    return np.stack([upper, lower], 2).reshape(-1, 3, 2).astype(np.float32)
+
+
+def shape_skirt(skirt: Skirt, fitting: Fitting, ease: float = 0.0) -> SkirtShape:
+    """Cut a skirt to a body's measure.
+
+    Args:
+        ease: of what is worn below it at the upper edge, metres.
+    """
+    body = fitting.body
+    scale = body.height / fitting.surface.model.template.height
+    radii, heights, axis = fitting.trunk
+    levels = heights.mean(1)
+    hip = float(body.joint("upperleg01.L")[2]) - 0.07 * scale
+    top = float(body.joint("spine04")[2]) + skirt.top * scale
+    ankle = float(body.joint("foot.L")[2])
+    hip_joint = float(body.joint("upperleg01.L")[2])
+    hem = hip_joint - skirt.length * (hip_joint - ankle)
+    angles = np.arange(COLUMNS, dtype=np.float32) * np.float32(2 * np.pi / COLUMNS)
+    z = np.linspace(top, hem, ROWS, dtype=np.float32)
+    around = np.stack([_rounded(radii, levels, height) for height in z])
+    legs = _legs_radii(fitting, z, angles, axis)
+    snug = np.maximum(around * (z > hip - 0.02)[:, None], legs) + np.float32(skirt.ease + ease)
+    near_top = ramp(top - z, 0.0, 0.08)[:, None]  # snug at the waistband
+    snug = snug - np.float32(skirt.ease * 0.6) * (1 - near_top)
+    radius = _flared(skirt, snug, z, hip, angles)
+    x, y = radius * np.sin(angles), axis - radius * np.cos(angles)
+    points = np.stack([x, y, np.broadcast_to(z[:, None], x.shape)], -1).reshape(-1, 3)
+    outward = np.stack([np.sin(angles), -np.cos(angles), 0 * angles], -1)
+    outward = np.broadcast_to(outward, (ROWS, COLUMNS, 3)).reshape(-1, 3)
+    steps = np.hypot(np.diff(z), np.diff(radius.mean(1)))
+    return SkirtShape(
+        points=points.astype(np.float32),
+        outward=outward.astype(np.float32),
+        weights=_weights(skirt, fitting, z, x, radius, hip),
+        down=np.concatenate([[0], np.cumsum(steps)]).astype(np.float32),
+        around=float(2 * np.pi * radius[ROWS // 3 :].mean()),
+    )
+
+
+def _rounded(radii: np.ndarray, levels: np.ndarray, height: float) -> np.ndarray:
+    """The trunk's radius at a height, at COLUMNS angles."""
+    row = np.clip(np.interp(-height, -levels, np.arange(len(levels))), 0, len(levels) - 1.001)
+    low = int(row)
+    ring = radii[low] + (row - low) * (radii[low + 1] - radii[low])
+    at = np.arange(COLUMNS) * ANGLES / COLUMNS
+    return np.interp(at, np.arange(ANGLES + 1), np.append(ring, ring[0])).astype(np.float32)
+
+
+def _legs_radii(fitting: Fitting, z: np.ndarray, angles: np.ndarray, axis: float) -> Grid:
+    """How far the spread legs reach from the skirt's axis, at heights and angles."""
+    out = np.zeros((len(z), len(angles)), np.float32)
+    for name in ("leg.L", "leg.R"):
+        cells = fitting.surface.limb_tubes[name].gather(fitting.body.points)
+        reach = cells[..., :1] * np.sin(angles) - (cells[..., 1:2] - axis) * np.cos(angles)
+        reach = reach.max(1)  # support of each ring in each direction
+        heights = cells[..., 2].mean(1)
+        for column in range(len(angles)):
+            out[:, column] = np.maximum(
+                out[:, column], np.interp(-z, -heights, reach[:, column], left=0)
+            )
+    return out
+
+
+def _flared(skirt: Skirt, snug: Grid, z: np.ndarray, hip: float, angles: np.ndarray) -> Grid:
+    """Radii: snug down to the hips, then falling outwards, with waves towards the hem."""
+    below = np.maximum(hip - z, 0)
+    radius = bridged(snug, 2)
+    at_hip = int(np.argmin(np.abs(z - hip)))
+    if z[-1] < hip:
+        oval = radius[at_hip]
+        rounder = oval + (oval.mean() - oval) * np.minimum(below * 1.2, 0.7)[:, None]
+        flare = rounder + np.float32(skirt.flare) * below[:, None]
+        radius = np.where(below[:, None] > 0, np.maximum(radius, flare), radius)
+    if skirt.kind in ("circle", "a_line", "maxi", "tiered") and skirt.flare > 0.15:
+        start = radius[0].mean()
+        early = radius[0] + np.float32(0.6 * skirt.flare) * (z[0] - z)[:, None]
+        radius = np.maximum(radius, early) if start > 0 else radius
+    if skirt.waves:
+        rng = np.random.default_rng(skirt.seed)
+        phase = skirt.waves * angles + 0.5 * np.sin(2 * angles + rng.uniform(0, 6.28))
+        wave = np.sin(phase + rng.uniform(0, 6.28))
+        grown = ramp(z[0] - z, 0.06, max(float(z[0] - z[-1]), 0.2))
+        radius = radius + np.float32(skirt.wave_height) * grown[:, None] * (wave + 0.6)
+    return radius.astype(np.float32)
+
+
+def _weights(
+    skirt: Skirt, fitting: Fitting, z: np.ndarray, x: Grid, radius: Grid, hip: float
+) -> SkinWeights:
+    """Rigid with the pelvis above the hips, then shared by the thighs, then by the shins."""
+    body = fitting.body
+    names = body.skeleton.index
+    knee = float(body.joint("lowerleg01.L")[2])
+    waist = float(body.joint("spine04")[2])
+    thighs = 0.88 * ramp(z, hip + 0.13, hip - 0.12)
+    shins = 0.85 * ramp(z, knee + 0.03, knee - 0.2)
+    above = ramp(z, waist - 0.02, waist + 0.12)  # of a dress's waist: the spine's
+    side = ramp(x / radius.max(1, keepdims=True), -0.75, 0.75)
+    count = ROWS * COLUMNS
+    matrix = np.zeros((count, len(names)), np.float32)
+    pelvis = ((1 - thighs) * (1 - above))[:, None] * np.ones_like(x)
+    matrix[:, names["root"]] = pelvis.ravel()
+    matrix[:, names["spine04"]] = (((1 - thighs) * above)[:, None] * np.ones_like(x)).ravel()
+    for name, share in (("L", side), ("R", 1 - side)):
+        thigh = (thighs * (1 - shins))[:, None] * share
+        matrix[:, names[f"upperleg01.{name}"]] = thigh.ravel()
+        matrix[:, names[f"lowerleg01.{name}"]] = ((thighs * shins)[:, None] * share).ravel()
+    return SkinWeights(csr_array(matrix))
+
+
+@dataclass(frozen=True)
+class Cones:
+    """Legs as cones.
+
+    Attributes:
+        start, end: N x 3, the axes.
+        radius: N x 2 at start and end, metres.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    radius: np.ndarray
+
+
+def leg_cones(surface: BodySurface, points: Points, clearance: float = 0.0) -> Cones:
+    """The legs of a posed skin as chains of cones that enclose them."""
+    starts, ends, radii = [], [], []
+    for name in ("leg.L", "leg.R"):
+        rings = surface.limb_tubes[name].gather(points)[list(_RINGS)]
+        centre = rings.mean(1)
+        radius = np.linalg.norm(rings - centre[:, None], axis=2).mean(1) * 1.04 + clearance
+        starts.append(centre[:-1])
+        ends.append(centre[1:])
+        radii.append(np.stack([radius[:-1], radius[1:]], 1))
+    return Cones(np.concatenate(starts), np.concatenate(ends), np.concatenate(radii))
+
+
+def exit_distance(points: Points, outward: Points, cones: Cones) -> np.ndarray:
+    """How far each point has to go along its outward direction to leave all cones ahead; N."""
+    ray = np.zeros(len(points), np.float32)
+    for start, end, radii in zip(cones.start, cones.end, cones.radius, strict=True):
+        axis = end - start
+        long = float(np.sqrt(axis @ axis)) + 1e-9
+        unit = (axis / long).astype(np.float32)
+        offset = points - start.astype(np.float32)
+        along_p, along_d = offset @ unit, outward @ unit
+        m = offset - along_p[:, None] * unit
+        d = outward - along_d[:, None] * unit
+        dd = np.einsum("ni,ni->n", d, d) + 1e-6
+        md, mm = np.einsum("ni,ni->n", m, d), np.einsum("ni,ni->n", m, m)
+        at = np.clip(along_p / long, 0, 1)
+        for _ in range(2):
+            radius = radii[0] + (radii[1] - radii[0]) * at
+            inside = md * md - dd * (mm - radius * radius)
+            root = (np.sqrt(np.maximum(inside, 0)) - md) / dd
+            at = np.clip((along_p + root * along_d) / long, 0, 1)
+        place = (along_p + root * along_d) / long
+        hit = (inside > 0) & (root > 0) & (place > -0.05) & (place < 1.05) & (dd > 0.05)
+        ray = np.maximum(ray, np.where(hit, root, 0))
+    return ray
+
+
+def settler(shape: SkirtShape, surface: BodySurface, rows_from: int = 4):
+    """What leaves a skirt outside the legs, taut between them: a `Settle`."""
+    first = rows_from * COLUMNS
+
+    def settle(points: Points, body: PosedBody) -> Points:
+        outward = _turned(shape, body)[first:]
+        cones = leg_cones(surface, body.points, _CLEARANCE)
+        push = exit_distance(points[first:], outward, cones).reshape(-1, COLUMNS)
+        if not push.any():
+            return points
+        need = np.minimum(push, 0.6)
+        lift = need
+        for _ in range(5):  # cloth is drawn taut over what pushes it
+            around = (np.roll(lift, 1, 1) + np.roll(lift, -1, 1)) / 2
+            padded = np.concatenate([lift[:1] * 0.5, lift, lift[-1:]])
+            lift = np.maximum(need, (around + (padded[:-2] + padded[2:]) / 2) / 2)
+        out = points.copy()
+        out[first:] += outward * lift.reshape(-1, 1)
+        return out
+
+    return settle
+
+
+def _turned(shape: SkirtShape, body: PosedBody) -> Points:
+    """Outward directions after skinning."""
+    matrices = body.transforms.reshape(-1, 12)
+    turns = (shape.weights.matrix @ matrices).reshape(-1, 3, 4)[..., :3]
+    turned = np.einsum("vij,vj->vi", turns, shape.outward)
+    return turned / (np.linalg.norm(turned, axis=1, keepdims=True) + 1e-9)
