@@ -11,6 +11,7 @@ bone's head and followed by its parent's.
 
 from __future__ import annotations
 
+import fcntl
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property
@@ -200,18 +201,27 @@ class BodyModel:
 def load_body_model() -> BodyModel:
     """The body model, loaded once a process.
 
-    The very first time on a machine `anny` computes a cache, which takes two to three minutes.
+    The very first time on a machine `anny` computes a cache (see `FIRST_USE`); processes that
+    start meanwhile wait for the one that does.
 
     Raises: InputError with the command that installs the extra, where it is missing.
     """
     require_people()
-    return BodyModel()
+    folder = _cache_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".motion-transfer.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return BodyModel()
 
 
 def is_cached() -> bool:
     """Whether loading the body model will be quick: `anny` has left its cache on this machine."""
     require_people()
+    # three stages are saved one by one; the last one is there only when all are
+    return any(_cache_folder().glob("v*/build_compact_model_data_*"))
+
+
+def _cache_folder() -> Path:
     from anny.paths import get_anny_cache_path
 
-    # three stages are saved one by one; the last one is there only when all are
-    return len(list(Path(get_anny_cache_path()).glob("v*/build_compact_model_data_*"))) > 0
+    return Path(get_anny_cache_path())

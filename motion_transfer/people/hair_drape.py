@@ -136,12 +136,10 @@ def drape(
         way = fall.stiffness * way + (1 - fall.stiffness) * pull
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
         new = at + fall.step[:, None] * way
-        for _ in range(2):
-            _, near = tree.query(new)
-            normal = outward[near]
-            depth = clear - ((new - points[near]) * normal).sum(1)
-            push = np.clip(depth, 0, None)
-            new = new + push[:, None] * normal
+        _, near = tree.query(new)
+        normal = outward[near]
+        depth = clear - ((new - points[near]) * normal).sum(1)
+        new = new + np.maximum(depth, 0)[:, None] * normal
         touched = np.where(depth > -0.004, np.clip(normal[:, 2] + 0.3, 0, 1), 0).astype(np.float32)
         way = (new - at) / np.maximum(np.linalg.norm(new - at, axis=1, keepdims=True), 1e-6)
         at = out[k] = new.astype(np.float32)

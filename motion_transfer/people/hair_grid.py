@@ -13,7 +13,7 @@ from jaxtyping import Float32
 from scipy.sparse import csr_array
 
 from motion_transfer.people.body import Body, BodyModel, Faces, SkinWeights
-from motion_transfer.people.face_paint import bald_crown, hairline_height
+from motion_transfer.people.face_paint import bald_crown, hairline_height, ramp
 from motion_transfer.people.faces import Hairline
 from motion_transfer.people.head_map import HeadMap, head_map
 from motion_transfer.people.skin_atlas import head_angle
@@ -46,6 +46,7 @@ def rays(
     part: tuple[tuple[float, float], tuple[float, float]],
     angles: Float32[np.ndarray, " columns"],
     lengths: Grid,
+    spread: tuple[float, float] = (0.7, 2.4),
 ) -> Float32[np.ndarray, "rows columns 2"]:
     """Places on the head's map along rays that leave a parting sideways.
 
@@ -53,18 +54,21 @@ def rays(
         part: the parting's front and back end on the map.
         angles: of the columns: 0 to the front, positive to the left, up to 2 pi.
         lengths: along each ray, radians.
+        spread: rays at the first angle and before leave the front end, at the second the back end.
     """
-    roots, ways = ray_roots(part, angles)
+    roots, ways = ray_roots(part, angles, spread)
     return (roots + ways * lengths[..., None]).astype(np.float32)
 
 
 def ray_roots(
-    part: tuple[tuple[float, float], tuple[float, float]], angles: Float32[np.ndarray, " columns"]
+    part: tuple[tuple[float, float], tuple[float, float]],
+    angles: Float32[np.ndarray, " columns"],
+    spread: tuple[float, float],
 ) -> tuple[Float32[np.ndarray, "columns 2"], Float32[np.ndarray, "columns 2"]]:
     """Where rays leave a parting, and their unit directions."""
     front, back = np.array(part, np.float32)
-    share = np.clip((np.abs(np.mod(angles + np.pi, 2 * np.pi) - np.pi) - 0.7) / 1.7, 0, 1)
-    share = (share * share * (3 - 2 * share))[:, None]
+    turn = np.abs(np.mod(angles + np.pi, 2 * np.pi) - np.pi)
+    share = ramp(turn, *spread)[:, None]
     ways = np.stack([np.sin(angles), -np.cos(angles)], 1)
     return front + share * (back - front), ways
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float32
+from scipy.interpolate import make_interp_spline
 
 from motion_transfer.people.body import Points
 from motion_transfer.people.face_paint import ramp
@@ -16,8 +17,17 @@ from motion_transfer.people.hair_grid import Head, grid_faces, ray_roots, rays, 
 from motion_transfer.people.hair_styles import Hair
 from motion_transfer.people.mesh import Piece, PosedBody
 
-_COLUMNS, _HUG, _HANG = 72, 14, 20
+_COLUMNS, _HUG, _HANG = 72, 14, 28
+_GUIDES, _STEPS = 36, 12  # what is marched; the rest lies between
+Parting = tuple[tuple[float, float], tuple[float, float]]
 _RELEASE = 1.60  # radians from straight up at which hair leaves the head
+
+
+@cache
+def _refine() -> Float32[np.ndarray, "rows steps"]:
+    """Hanging rows from a strand's root and its marched points, by a smooth curve."""
+    curve = make_interp_spline(np.arange(_STEPS + 1), np.eye(_STEPS + 1), k=3)
+    return curve(np.arange(1, _HANG + 1) * (_STEPS / _HANG)).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -25,32 +35,41 @@ class Curtain:
     """Settles hanging rows below rows that move with the head.
 
     Attributes:
-        fall: how they hang.
-        swing: HANG x COLUMNS metres by which waves move each point sideways and outward.
-        groups: columns at which a new lock begins; smoothing stops there.
+        fall: how the guides hang.
+        guides: columns that are marched.
+        between: COLUMNS x GUIDES: each column from its guides.
+        swing: HANG x COLUMNS x 2 metres by which waves move each point sideways and outward.
+        breaks: columns at which a new lock begins.
+        skin, normals: what the hair keeps clear of.
     """
 
     fall: Fall
-    swing: Float32[np.ndarray, "steps columns 2"]
-    groups: tuple[int, ...]
+    guides: np.ndarray
+    between: Float32[np.ndarray, "columns guides"]
+    swing: Float32[np.ndarray, "rows columns 2"]
+    breaks: tuple[int, ...]
     skin: Obstacle
     normals: Points
 
     def __call__(self, points: Points, posed: PosedBody) -> Points:
         out = points.reshape(_HUG + _HANG, _COLUMNS, 3).copy()
         last = out[_HUG - 1]
-        way = last - out[_HUG - 2]
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
-        strands = drape(last, way, self.fall, self.skin, self.normals, posed)
-        for first, stop in zip(self.groups[:-1], self.groups[1:], strict=True):
-            lock = strands[:, first:stop]
-            lock[:, 1:-1] = 0.5 * lock[:, 1:-1] + 0.25 * (lock[:, 2:] + lock[:, :-2])
-        along = np.gradient(last, axis=0)
-        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-6)
-        outward = np.cross(way, along)
-        outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-6)
-        out[_HUG:] = strands + self.swing[..., :1] * along + self.swing[..., 1:] * outward
+        way = _unit(last - out[_HUG - 2])
+        roots = last[self.guides]
+        strands = drape(roots, way[self.guides], self.fall, self.skin, self.normals, posed)
+        strands = np.concatenate([roots[None], strands])
+        # the columns' own roots are kept: only what lies below them comes from the guides
+        strands = np.einsum("cg,sgx->scx", self.between, strands)
+        strands[0] = last
+        rows = (_refine() @ strands.reshape(_STEPS + 1, -1)).reshape(_HANG, _COLUMNS, 3)
+        along = _unit(np.gradient(last, axis=0))
+        outward = _unit(np.cross(way, along))
+        out[_HUG:] = rows + self.swing[..., :1] * along + self.swing[..., 1:] * outward
         return out.reshape(-1, 3)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-6)
 
 
 def hang_piece(hair: Hair, head: Head, rest: PosedBody, limit: float | None = None) -> Piece:
@@ -61,24 +80,25 @@ def hang_piece(hair: Hair, head: Head, rest: PosedBody, limit: float | None = No
         limit: metres that it may stand off the head at most (under a hat).
     """
     rng = np.random.default_rng(hair.seed)
-    part, angles = _layout(hair, rng)
-    roots, ways = ray_roots(part, angles)
+    part, angles, spread = _layout(hair, rng)
+    roots, ways = ray_roots(part, angles, spread)
     release = until(roots, ways, _RELEASE)
     fringe = _fringe(hair, angles)
     brow = until(roots, ways, 1.02 + 0.36 * hair.fringe)
+    brow = brow + 0.035 * rng.standard_normal(_COLUMNS)
     release = release + fringe * (np.minimum(brow, release) - release)
     rows = np.linspace(0, 1, _HUG, dtype=np.float32)[:, None]
     lengths = (rows * release).astype(np.float32)
-    points, normals, _ = head.map.at(rays(part, angles, lengths))
+    points, normals, _ = head.map.at(rays(part, angles, lengths, spread))
     off = _standing(hair, lengths, fringe, rng)
     hug = points + np.minimum(off, limit or 1.0)[..., None] * normals
     azimuth = np.abs(np.arctan2(*(roots + ways * release[:, None]).T * np.array([[1], [-1]])))
     front = np.degrees(azimuth) < (55 + 55 * hair.front if hair.front > 0 else 0)
-    curtain = _curtain(hair, head, fringe, front, rng)
+    curtain, length = _curtain(hair, head, fringe, front, rng)
     surface = np.concatenate([hug, np.repeat(hug[-1:], _HANG, 0)]).reshape(-1, 3)
     surface = curtain(np.ascontiguousarray(surface, np.float32), rest)
-    faces, uv = grid_faces(_HUG + _HANG, _COLUMNS, closed=False)
-    faces, uv = _cut_locks(faces, uv, curtain)
+    faces, uv = grid_faces(_HUG + _HANG, _COLUMNS, closed=hair.fringe > 0)
+    faces, uv = _cut_locks(faces, uv, curtain.breaks, hair.length)
     return Piece(
         name="hair",
         points=surface,
@@ -86,7 +106,7 @@ def hang_piece(hair: Hair, head: Head, rest: PosedBody, limit: float | None = No
         weights=head.rigid(len(surface)),
         corner_uv=uv,
         material=hair_material(hair, (0.6, 0.15 + hair.length)),
-        keep=_hem(rng, curtain.fall),
+        keep=_hem(rng, length),
         two_sided=True,
         settle=curtain,
     )
@@ -94,18 +114,18 @@ def hang_piece(hair: Hair, head: Head, rest: PosedBody, limit: float | None = No
 
 def _layout(
     hair: Hair, rng: np.random.Generator
-) -> tuple[tuple[tuple[float, float], tuple[float, float]], Float32[np.ndarray, " columns"]]:
-    """The parting, and the columns' angles from the left edge of the face to its right."""
+) -> tuple[Parting, Float32[np.ndarray, " columns"], tuple[float, float]]:
+    """The parting, the columns' angles, and over which angles columns spread along the parting."""
     if hair.fringe > 0:
-        angles = np.linspace(0.02, 2 * np.pi - 0.02, _COLUMNS)
-        # the seam is behind, where the hair is deepest
-        return ((0.0, -0.25), (0.0, 0.25)), (angles + np.pi).astype(np.float32) % (2 * np.pi)
+        # a closed grid, whose seam is behind
+        angles = np.linspace(np.pi, 3 * np.pi, _COLUMNS, endpoint=False) % (2 * np.pi)
+        return ((0.0, -0.25), (0.0, 0.25)), angles.astype(np.float32), (0.7, 2.4)
     side = 0.38 * hair.part
     opening = np.radians(rng.uniform(98, 114))
     tuck = 0.25 if hair.tuck else 0.0
     left, right = opening + tuck - 0.25 * hair.part, opening + tuck + 0.25 * hair.part
     angles = np.linspace(left, 2 * np.pi - right, _COLUMNS).astype(np.float32)
-    return ((side, -0.97 - hair.hairline.raised / 100), (0.4 * side, 0.35)), angles
+    return ((side, -0.97 - hair.hairline.raised / 100), (0.4 * side, 0.35)), angles, (1.9, 2.9)
 
 
 def _fringe(hair: Hair, angles: Float32[np.ndarray, " columns"]) -> Float32[np.ndarray, " columns"]:
@@ -137,45 +157,67 @@ def _curtain(
     fringe: Float32[np.ndarray, " columns"],
     front: np.ndarray,
     rng: np.random.Generator,
-) -> Curtain:
-    layered = 1 - 0.10 * rng.random(_COLUMNS)
-    length = hair.length * layered * (1 - fringe) + 0.012 * fringe
+) -> tuple[Curtain, Float32[np.ndarray, " columns"]]:
+    length = hair.length * (1 - fringe) + 0.012 * fringe
+    guides = np.unique(np.linspace(0, _COLUMNS - 1, _GUIDES).round().astype(int))
+    side = np.where(front, 1, -1).astype(np.float32)
+    breaks = np.flatnonzero(np.diff(side)) + 1
     fall = Fall(
-        step=(length / _HANG).astype(np.float32),
-        steps=_HANG,
-        clear=np.where(fringe > 0.5, 0.006, 0.45 * hair.volume + 0.006).astype(np.float32),
-        front=np.where(front, 1, -1).astype(np.float32),
-        stiffness=0.45,
+        step=(length[guides] / _STEPS).astype(np.float32),
+        steps=_STEPS,
+        clear=np.where(fringe > 0.5, 0.006, 0.45 * hair.volume + 0.006)[guides].astype(np.float32),
+        front=side[guides],
+        stiffness=0.4,
         inward=1.2 * float(rng.uniform(-0.2, 1)) if hair.style == "bob" else 0.0,
     )
-    down = np.arange(1, _HANG + 1)[:, None] * fall.step
+    down = np.linspace(0, 1, _HANG + 1)[1:, None] * length
     phase = np.cumsum(rng.normal(0, 0.5, _COLUMNS))
     wave = hair.wave * ramp(down, 0.0, 0.10)
     turn = 2 * np.pi * down / (0.11 - 0.04 * hair.curl) + phase
     swing = np.stack([0.8 * wave * np.sin(turn), wave * (1 + np.cos(turn))], -1)
-    changes = np.flatnonzero(np.diff(fall.front)) + 1
-    groups = (0, *(int(k) for k in changes), _COLUMNS)
     skin = obstacle(head.model)
-    return Curtain(fall, swing.astype(np.float32), groups, skin, rest_normals(head.body, skin))
+    return Curtain(
+        fall=fall,
+        guides=guides,
+        between=_between(guides, breaks),
+        swing=swing.astype(np.float32),
+        breaks=tuple(int(k) for k in breaks),
+        skin=skin,
+        normals=rest_normals(head.body, skin),
+    ), length
 
 
-def _cut_locks(faces: np.ndarray, uv: np.ndarray, curtain: Curtain) -> tuple[np.ndarray, np.ndarray]:
+def _between(guides: np.ndarray, breaks: np.ndarray) -> Float32[np.ndarray, "columns guides"]:
+    """Each column as a mixture of the guides of its own lock."""
+    columns = np.arange(_COLUMNS)
+    lock = np.searchsorted(breaks, columns, side="right")
+    out = np.zeros((_COLUMNS, len(guides)), np.float32)
+    for k in np.unique(lock):
+        own = np.flatnonzero(lock[guides] == k)
+        mine = lock == k
+        hats = [np.interp(columns[mine], guides[own], row) for row in np.eye(len(own))]
+        out[np.ix_(mine, own)] = np.array(hats).T
+    return out
+
+
+def _cut_locks(
+    faces: np.ndarray, uv: np.ndarray, breaks: tuple[int, ...], length: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Leave out what would span the gap between hair before and behind the shoulder."""
     row, column = faces // _COLUMNS, faces % _COLUMNS
-    low = row.max(1) > _HUG + 0.09 / max(float(curtain.fall.step.max()), 1e-6)
+    low = row.max(1) > _HUG + 0.09 * _HANG / max(length, 1e-6)
     across = np.zeros(len(faces), bool)
-    for first in curtain.groups[1:-1]:
-        across |= (column.min(1) < first) & (column.max(1) >= first)
+    for first in breaks:
+        across |= (column.min(1) == first - 1) & (column.max(1) == first)
     kept = ~(low & across)
     return np.ascontiguousarray(faces[kept]), np.ascontiguousarray(uv[kept])
 
 
-def _hem(rng: np.random.Generator, fall: Fall) -> Float32[np.ndarray, " V"]:
-    """Ragged ends: strands stop short of the last row by up to two centimetres."""
-    down = np.arange(1 - _HUG, _HANG + 1)[:, None] * fall.step
-    total = fall.step * _HANG
-    short = np.minimum(rng.gamma(1.5, 0.006, _COLUMNS) + 0.001, 0.6 * total)
-    return (total - short - np.maximum(down, 0)).astype(np.float32).ravel()
-
-
-Settler = Callable[[Points, PosedBody], Points]
+def _hem(
+    rng: np.random.Generator, length: Float32[np.ndarray, " columns"]
+) -> Float32[np.ndarray, " V"]:
+    """Ragged ends: strands stop short of the last row by up to a few centimetres."""
+    down = np.linspace(0, 1, _HANG + 1)[1:, None] * length
+    down = np.concatenate([np.full((_HUG, _COLUMNS), -0.01), down])
+    short = rng.gamma(1.3, 0.005 + 0.014 * length) + 0.001
+    return (length - np.minimum(short, 0.7 * length) - down).astype(np.float32).ravel()

@@ -19,7 +19,6 @@ from motion_transfer.people.fit import Fitting
 from motion_transfer.people.mesh import PosedBody
 from motion_transfer.people.outfits import Skirt
 from motion_transfer.people.surface import BodySurface, along_polyline
-from motion_transfer.people.tubes import ANGLES, bridged
 
 COLUMNS = 48
 ROWS = 26
@@ -80,8 +79,7 @@ def shape_skirt(skirt: Skirt, fitting: Fitting, ease: float = 0.0) -> SkirtShape
     """
     body = fitting.body
     scale = body.height / fitting.surface.model.template.height
-    radii, heights, axis = fitting.trunk
-    levels = heights.mean(1)
+    axis = fitting.trunk[2]
     hip = float(body.joint("upperleg01.L")[2]) - 0.07 * scale
     top = float(body.joint("spine04")[2]) + skirt.top * scale
     ankle = float(body.joint("foot.L")[2])
@@ -89,9 +87,8 @@ def shape_skirt(skirt: Skirt, fitting: Fitting, ease: float = 0.0) -> SkirtShape
     hem = hip_joint - skirt.length * (hip_joint - ankle)
     angles = np.arange(COLUMNS, dtype=np.float32) * np.float32(2 * np.pi / COLUMNS)
     z = np.linspace(top, hem, ROWS, dtype=np.float32)
-    around = np.stack([_rounded(radii, levels, height) for height in z])
-    legs = _legs_radii(fitting, z, angles, axis)
-    snug = np.maximum(around * (z > hip - 0.02)[:, None], legs) + np.float32(skirt.ease + ease)
+    reach = np.maximum(_trunk_reach(fitting, z, angles), _legs_reach(fitting, z, angles))
+    snug = _hull_radii(reach) + np.float32(skirt.ease + ease)
     near_top = ramp(top - z, 0.0, 0.08)[:, None]  # snug at the waistband
     snug = snug - np.float32(skirt.ease * 0.6) * (1 - near_top)
     radius = _flared(skirt, snug, z, hip, angles)
@@ -109,34 +106,49 @@ def shape_skirt(skirt: Skirt, fitting: Fitting, ease: float = 0.0) -> SkirtShape
     )
 
 
-def _rounded(radii: np.ndarray, levels: np.ndarray, height: float) -> np.ndarray:
-    """The trunk's radius at a height, at COLUMNS angles."""
-    row = np.clip(np.interp(-height, -levels, np.arange(len(levels))), 0, len(levels) - 1.001)
-    low = int(row)
-    ring = radii[low] + (row - low) * (radii[low + 1] - radii[low])
-    at = np.arange(COLUMNS) * ANGLES / COLUMNS
-    return np.interp(at, np.arange(ANGLES + 1), np.append(ring, ring[0])).astype(np.float32)
+def _reach(cells: np.ndarray, z: np.ndarray, angles: np.ndarray, axis: float) -> Grid:
+    """How far a tube's rings reach from the skirt's axis in each direction, 0 off its ends."""
+    across = cells[..., :1] * np.sin(angles) - (cells[..., 1:2] - axis) * np.cos(angles)
+    across = across.max(1)
+    heights = cells[..., 2].mean(1)
+    at = np.interp(-z, -heights, np.arange(len(heights)))
+    low = np.minimum(at.astype(int), len(heights) - 2)
+    share = (at - low)[:, None]
+    out = across[low] * (1 - share) + across[low + 1] * share
+    beyond = (z > heights[0] + 0.02) | (z < heights[-1] - 0.05)
+    return np.where(beyond[:, None], 0, out).astype(np.float32)
 
 
-def _legs_radii(fitting: Fitting, z: np.ndarray, angles: np.ndarray, axis: float) -> Grid:
-    """How far the spread legs reach from the skirt's axis, at heights and angles."""
+def _trunk_reach(fitting: Fitting, z: np.ndarray, angles: np.ndarray) -> Grid:
+    cells = fitting.surface.torso_tube.gather(fitting.body.points)
+    return _reach(cells, z, angles, fitting.trunk[2])
+
+
+def _legs_reach(fitting: Fitting, z: np.ndarray, angles: np.ndarray) -> Grid:
     out = np.zeros((len(z), len(angles)), np.float32)
     for name in ("leg.L", "leg.R"):
         cells = fitting.surface.limb_tubes[name].gather(fitting.body.points)
-        reach = cells[..., :1] * np.sin(angles) - (cells[..., 1:2] - axis) * np.cos(angles)
-        reach = reach.max(1)  # support of each ring in each direction
-        heights = cells[..., 2].mean(1)
-        for column in range(len(angles)):
-            out[:, column] = np.maximum(
-                out[:, column], np.interp(-z, -heights, reach[:, column], left=0)
-            )
+        out = np.maximum(out, _reach(cells, z, angles, fitting.trunk[2]))
     return out
+
+
+@cache
+def _secants() -> np.ndarray:
+    """1 / cos of the angle between columns; large where they are more than 80 degrees apart."""
+    turn = np.arange(COLUMNS) * 2 * np.pi / COLUMNS
+    cosine = np.cos(turn[:, None] - turn)
+    return np.where(cosine > 0.17, 1 / np.maximum(cosine, 0.17), 1e3).astype(np.float32)
+
+
+def _hull_radii(reach: Grid) -> Grid:
+    """Radii of the convex outlines that reach so far in each direction."""
+    return (reach[:, None, :] * _secants()).min(2)
 
 
 def _flared(skirt: Skirt, snug: Grid, z: np.ndarray, hip: float, angles: np.ndarray) -> Grid:
     """Radii: snug down to the hips, then falling outwards, with waves towards the hem."""
     below = np.maximum(hip - z, 0)
-    radius = bridged(snug, 2)
+    radius = snug
     at_hip = int(np.argmin(np.abs(z - hip)))
     if z[-1] < hip:
         oval = radius[at_hip]
@@ -208,8 +220,11 @@ def leg_cones(surface: BodySurface, points: Points, clearance: float = 0.0) -> C
 
 
 def exit_distance(points: Points, outward: Points, cones: Cones) -> np.ndarray:
-    """How far each point has to go along its outward direction to leave all cones ahead; N."""
-    ray = np.zeros(len(points), np.float32)
+    """How far each point has to go along its outward direction until all cones lie behind it.
+
+    Returns: N; negative where they do already, -1 where the line meets none.
+    """
+    ray = np.full(len(points), -1, np.float32)
     for start, end, radii in zip(cones.start, cones.end, cones.radius, strict=True):
         axis = end - start
         long = float(np.sqrt(axis @ axis)) + 1e-9
@@ -227,8 +242,8 @@ def exit_distance(points: Points, outward: Points, cones: Cones) -> np.ndarray:
             root = (np.sqrt(np.maximum(inside, 0)) - md) / dd
             at = np.clip((along_p + root * along_d) / long, 0, 1)
         place = (along_p + root * along_d) / long
-        hit = (inside > 0) & (root > 0) & (place > -0.05) & (place < 1.05) & (dd > 0.05)
-        ray = np.maximum(ray, np.where(hit, root, 0))
+        hit = (inside > 0) & (place > -0.05) & (place < 1.05) & (dd > 0.05)
+        ray = np.maximum(ray, np.where(hit, root, -1))
     return ray
 
 
@@ -240,19 +255,36 @@ def settler(shape: SkirtShape, surface: BodySurface, rows_from: int = 4):
         outward = _turned(shape, body)[first:]
         cones = leg_cones(surface, body.points, _CLEARANCE)
         push = exit_distance(points[first:], outward, cones).reshape(-1, COLUMNS)
-        if not push.any():
-            return points
-        need = np.minimum(push, 0.6)
+        need = np.clip(push, 0, 0.6)
+        need = need - _sunk(push, np.maximum(outward[:, 2], 0).reshape(push.shape))
         lift = need
         for _ in range(5):  # cloth is drawn taut over what pushes it
-            around = (np.roll(lift, 1, 1) + np.roll(lift, -1, 1)) / 2
-            padded = np.concatenate([lift[:1] * 0.5, lift, lift[-1:]])
-            lift = np.maximum(need, (around + (padded[:-2] + padded[2:]) / 2) / 2)
+            lift = np.maximum(need, _spread(lift))
         out = points.copy()
         out[first:] += outward * lift.reshape(-1, 1)
         return out
 
     return settle
+
+
+def _sunk(push: Grid, upward: Grid) -> Grid:
+    """How far cloth that faces upwards sinks onto the legs below it, metres."""
+    if upward.max() < 0.2:
+        return np.zeros_like(push)
+    weight = ramp(upward, 0.15, 0.6)
+    known = ((push > -1) & (push < 0)) * weight
+    slack = known * np.clip(-push, 0, 0.3)
+    for _ in range(4):
+        slack, known = _spread(slack), _spread(known)
+    sunk = weight * slack / np.maximum(known, 0.02)
+    return np.where(push > 0, 0, np.minimum(sunk, np.where(push > -1, -push, 0.3)))
+
+
+def _spread(values: Grid) -> Grid:
+    """The mean of each cell's four neighbours; half the value above the first row."""
+    padded = np.concatenate([values[:1] * 0.5, values, values[-1:]])
+    around = np.roll(values, 1, 1) + np.roll(values, -1, 1)
+    return (around + padded[:-2] + padded[2:]) / 4
 
 
 def _turned(shape: SkirtShape, body: PosedBody) -> Points:
