@@ -4,6 +4,7 @@ Tensors in, tensors out: no files, no devices chosen, nothing printed.
 """
 
 from nhrr_core.config import PRESETS, VARIANTS, ModelConfig
+from nhrr_core.discriminator import Discriminator
 from nhrr_core.errors import ConfigError, IuvError, NhrrError, ShapeError
 from nhrr_core.fast_render_net import FastRenderNet
 from nhrr_core.feature_net import FeatureNet
@@ -14,6 +15,16 @@ from nhrr_core.iuv import (
     check_iuv,
     keep_parts,
     normalise_iuv,
+)
+from nhrr_core.losses import (
+    LossWeights,
+    adversarial_loss,
+    alpha_loss,
+    discriminator_loss,
+    face_identity_loss,
+    generator_loss,
+    perceptual_loss,
+    texture_loss,
 )
 from nhrr_core.model import NeuralReRenderer
 from nhrr_core.render_net import RenderNet
@@ -28,21 +39,30 @@ __all__ = [
     "PRESETS",
     "VARIANTS",
     "ConfigError",
+    "Discriminator",
     "FastRenderNet",
     "FeatureNet",
     "IuvError",
+    "LossWeights",
     "ModelConfig",
     "NeuralReRenderer",
     "NhrrError",
     "RenderNet",
     "ShapeError",
     "UVLayout",
+    "adversarial_loss",
+    "alpha_loss",
     "check_iuv",
+    "discriminator_loss",
     "extract_texture",
+    "face_identity_loss",
+    "generator_loss",
     "keep_parts",
     "load_uv_layout",
     "merge_textures",
     "normalise_iuv",
+    "perceptual_loss",
     "sample_features",
     "texture_coordinates",
+    "texture_loss",
 ]

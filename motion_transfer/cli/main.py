@@ -17,6 +17,7 @@ COMMANDS = {
     "run": "Render the person of a photo in the motion of a driver.",
     "demo": "Render a photo and a driver that ship with the program.",
     "people": "Synthetic people: photos with exact IUV, and drivers from motion.",
+    "eval": "Score renderers, and other methods' pictures, on the same pairs.",
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",
     "info": "Versions, device, renderers, sizes of a run; part names.",
 }
@@ -33,7 +34,9 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        return getattr(import_module(f"motion_transfer.cli.{cmd_name}"), cmd_name)
+        module = import_module(f"motion_transfer.cli.{cmd_name}")
+        # `eval_` for `eval`: a function does not take a builtin's name
+        return getattr(module, cmd_name, None) or getattr(module, f"{cmd_name}_")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

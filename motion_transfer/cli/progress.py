@@ -113,9 +113,10 @@ class CountBar:
         if self._bar is not None:
             self._bar.close()
 
-    def advance(self, count: int) -> None:
-        """So many more are done."""
+    def advance(self, count: int, total: int | None = None) -> None:
+        """So many more are done, of so many where that was not known before."""
         if self._bar is not None:
+            self._bar.total = total or self._bar.total
             self._bar.update(count)
 
 

@@ -27,3 +27,30 @@ class SectionCommand(click.Command):
         for heading, records in sections.items():
             with formatter.section(heading):
                 formatter.write_dl(records)
+
+
+class WordsCommand(SectionCommand):
+    """A command without arguments, whose repeatable options take several words at once.
+
+    `--weights a b --weights c` is `--weights a --weights b --weights c`.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        repeatable = {
+            name
+            for parameter in self.params
+            if isinstance(parameter, click.Option) and parameter.multiple
+            for name in parameter.opts
+        }
+        spread: list[str] = []
+        option, used = "", False
+        for word in args:
+            if word.startswith("-") and len(word) > 1:
+                name, _, value = word.partition("=")
+                option, used = (name if name in repeatable else ""), bool(value)
+            elif option and used:
+                spread.append(option)
+            else:
+                used = True
+            spread.append(word)
+        return super().parse_args(ctx, spread)

@@ -53,7 +53,7 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
     """
     photo = read_photo(options.source)
     iuv_path = options.source_iuv or find_iuv_beside(options.source)
-    iuv = _read_person(photo, iuv_path, options.person, options.source_iuv_order, "source")
+    iuv = read_person(photo, iuv_path, options.person, options.source_iuv_order, "source")
     taken = {part for garment in options.garments for part in garment.parts}
     kept = tuple(part for part in range(1, PART_COUNT + 1) if part not in taken)
     layers = [unfold(photo, iuv, kept, texture_size)]
@@ -70,11 +70,16 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
     return Source(photo, iuv, iuv_path, texture, visibility)
 
 
+def list_iuv_names(photo: Path) -> list[Path]:
+    """Where a photo's IUV is looked for: `<stem>_IUV.png` and `<stem>_iuv.png` next to it."""
+    return [photo.with_name(f"{photo.stem}_{word}.png") for word in ("IUV", "iuv")]
+
+
 def find_iuv_beside(photo: Path) -> Path:
     """`<stem>_IUV.png` or `<stem>_iuv.png` next to a photo. Raises: InputError if neither is."""
     if not photo.exists():
         raise InputError(f"source {photo} does not exist")
-    candidates = [photo.with_name(f"{photo.stem}_{word}.png") for word in ("IUV", "iuv")]
+    candidates = list_iuv_names(photo)
     for candidate in candidates:
         if candidate.exists():
             return candidate
@@ -153,7 +158,7 @@ def _unfold_garment(
 ) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
     photo = read_photo(garment.photo, "garment")
     path = garment.iuv or find_iuv_beside(garment.photo)
-    iuv = _read_person(photo, path, "largest", options.source_iuv_order, "garment")
+    iuv = read_person(photo, path, "largest", options.source_iuv_order, "garment")
     parts = tuple(part for part in garment.parts if part not in later)
     texture, visibility = unfold(photo, iuv, parts, texture_size)
     if parts and not visibility.any():
@@ -165,10 +170,16 @@ def _unfold_garment(
     return texture, visibility
 
 
-def _read_person(
+def read_person(
     photo: Photo, path: Path, choice: str, order: ChannelOrder | None, what: str
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """The IUV of one person in a photo, without pixels that the photo's alpha leaves out."""
+    """The IUV of one person in a photo, without pixels that the photo's alpha leaves out.
+
+    Args:
+        choice: `largest`, an index from the left (0 first), or a box `x0,y0,x1,y1` in px.
+        what: the photo's role, for messages.
+    Raises: InputError if the IUV cannot be read, is of another size, or shows nobody.
+    """
     where = f"{what} IUV {path}"
     raw = read_raw_iuv(path, f"{what} IUV")
     if raw.shape[:2] != photo.rgb.shape[:2]:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import click
 import pytest
 
 from motion_transfer.cli.main import COMMANDS
@@ -20,7 +21,8 @@ PATIENCE_SECONDS = 1.5  # it takes 0.2 on an idle machine
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--help"], ["--version"], ["run", "--help"], ["demo", "-h"], ["info", "-h"]]
+    "arguments",
+    [["--help"], ["--version"], ["run", "--help"], ["demo", "-h"], ["info", "-h"], ["eval", "-h"]],
 )
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     began = time.perf_counter()
@@ -53,11 +55,14 @@ def test_help_of_run_has_sections_in_order(mt) -> None:
     assert headings[:5] == ["Source:", "Driver:", "Garment transfer:", "Rendering:", "Output:"]
 
 
-def test_every_option_is_explained(mt) -> None:
-    from motion_transfer.cli.run import run
+@pytest.mark.parametrize("command", ["run", "eval"])
+def test_every_option_is_explained(mt, command: str) -> None:
+    from motion_transfer.cli.main import cli
 
-    text = mt("run", "--help").out
-    for parameter in run.params:
+    found = cli.get_command(click.Context(cli), command)
+    assert found is not None
+    text = mt(command, "--help").out
+    for parameter in found.params:
         assert parameter.help, parameter.name
         assert all(option in text for option in parameter.opts)
 

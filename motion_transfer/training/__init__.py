@@ -1,0 +1,1 @@
+"""Training: frozen networks that judge images, and what the trainer builds on."""

@@ -1,0 +1,175 @@
+"""How far a rendered picture is from the real one. Numbers only: no files, no networks.
+
+Convention: pictures are uint8 RGB, H x W x 3; a mask is bool, H x W, True where pixels count, and
+None counts all. Sums are in float64. Where a mask leaves nothing to count the result is NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, UInt8
+from torch import Tensor
+
+from motion_transfer.render.person import disc, occupancy
+from nhrr_core import extract_texture, load_uv_layout
+
+Image = UInt8[np.ndarray, "H W 3"]
+Mask = Bool[np.ndarray, "H W"]
+
+PEAK = 255.0
+SSIM_WINDOW = 11
+SSIM_SIGMA = 1.5
+SSIM_K1, SSIM_K2 = 0.01, 0.03
+MASK_GROWTH = 0.05  # of the person's height: hair and clothes reach beyond the IUV by about that
+FLICKER_TEXELS = 128  # side of the texture that flicker is measured in: a few pixels a texel
+
+
+def ssim(first: Image, second: Image, mask: Mask | None = None) -> float:
+    """Structural similarity, at most 1.
+
+    Each channel's map of a Gaussian window of 11 x 11 px, sigma 1.5, K1 0.01, K2 0.03, range 255,
+    population covariance; the mean over channels and over all pixels (of the mask) whose window
+    lies inside the picture. Equals scikit-image's `structural_similarity` with
+    `gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=255`.
+
+    Source: Wang, Bovik, Sheikh, Simoncelli, IEEE TIP 2004. Departs from it: colour channels are
+    averaged instead of reduced to luminance, as the literature on pose transfer does.
+    """
+    return average_ssim(ssim_map(first, second), mask)
+
+
+def average_ssim(likeness: Float[np.ndarray, "H W"], mask: Mask | None = None) -> float:
+    """The mean of an SSIM map over the pixels whose window lies inside the picture."""
+    border = SSIM_WINDOW // 2
+    inside = np.s_[border:-border, border:-border]
+    return _mean(likeness[inside], None if mask is None else mask[inside])
+
+
+def ssim_map(first: Image, second: Image) -> Float[np.ndarray, "H W"]:
+    """Structural similarity around each pixel, mean over channels; mirrored at the border."""
+    offsets = np.arange(SSIM_WINDOW) - SSIM_WINDOW // 2
+    window = np.exp(-(offsets**2) / (2 * SSIM_SIGMA**2))
+    window /= window.sum()
+    a, b = first.astype(np.float64), second.astype(np.float64)
+
+    def smooth(image: np.ndarray) -> np.ndarray:
+        return cv2.sepFilter2D(image, cv2.CV_64F, window, window, borderType=cv2.BORDER_REFLECT)
+
+    mean_a, mean_b = smooth(a), smooth(b)
+    variances = smooth(a * a + b * b) - mean_a**2 - mean_b**2
+    covariance = smooth(a * b) - mean_a * mean_b
+    c1, c2 = (SSIM_K1 * PEAK) ** 2, (SSIM_K2 * PEAK) ** 2
+    likeness = (2 * mean_a * mean_b + c1) * (2 * covariance + c2)
+    likeness /= (mean_a**2 + mean_b**2 + c1) * (variances + c2)
+    return likeness.mean(-1)
+
+
+def psnr(first: Image, second: Image, mask: Mask | None = None) -> float:
+    """Peak signal-to-noise ratio in dB: 10 log10(255^2 / mean squared error); infinite if equal."""
+    difference = first.astype(np.float64) - second
+    error = _mean((difference**2).mean(-1), mask)
+    return float("inf") if error == 0 else float(10 * np.log10(PEAK**2 / error))
+
+
+def l1(first: Image, second: Image, mask: Mask | None = None) -> float:
+    """Mean absolute difference, in levels of 0..255."""
+    return _mean(np.abs(first.astype(np.float64) - second).mean(-1), mask)
+
+
+def person_mask(iuv: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"] | None) -> Mask:
+    """Where the person is: alpha of at least one half; without alpha the IUV, grown.
+
+    It grows by 5 % of the person's height, as hair and loose clothes leave the IUV.
+    """
+    if alpha is not None:
+        return alpha >= 128
+    body = occupancy(iuv)
+    rows = np.flatnonzero(body.any(1))
+    if not len(rows):
+        return body > 0
+    return cv2.dilate(body, disc((rows[-1] - rows[0] + 1) * MASK_GROWTH)) > 0
+
+
+def feature_distance(
+    first: Sequence[Float[Tensor, "N C H W"]],
+    second: Sequence[Float[Tensor, "N C H W"]],
+    mask: Mask | None = None,
+) -> list[float]:
+    """Distance of deep features, for each of N pictures, in [0, 2].
+
+    At each position of each layer the channels are scaled to unit length; the distance is the
+    Euclidean length of the difference, averaged over positions (weighted by the mask, reduced by
+    area), then over layers. Like LPIPS (Zhang et al., CVPR 2018), but with lengths instead of
+    squares and without weights learned from people's judgement, hence never to be called that.
+    """
+    layers = []
+    for a, b in zip(first, second, strict=True):
+        difference = F.normalize(a.double(), dim=1) - F.normalize(b.double(), dim=1)
+        lengths = difference.square().sum(1).sqrt()
+        if mask is None:
+            layers.append(lengths.mean((1, 2)))
+            continue
+        weight = torch.from_numpy(mask).to(lengths)[None, None]
+        weight = F.adaptive_avg_pool2d(weight, (lengths.shape[1], lengths.shape[2]))[0, 0]
+        layers.append((lengths * weight).sum((1, 2)) / weight.sum())
+    return torch.stack(layers).mean(0).tolist()
+
+
+def flicker(
+    first: Image,
+    first_iuv: UInt8[np.ndarray, "H W 3"],
+    second: Image,
+    second_iuv: UInt8[np.ndarray, "H W 3"],
+) -> float:
+    """Change between two consecutive frames that motion does not explain, in levels of 0..255.
+
+    Both frames are unfolded through their own IUV into a texture of 128 x 128 texels, where a body
+    that only moves stays in place. The result is the mean absolute difference over the texels
+    that both frames show; 0 for a still. Real videos are not at 0 (light, folds, faults of the
+    IUV): compare with the real video's own. Sees nothing outside the IUV, such as loose hair.
+    """
+    images, iuvs = (
+        torch.from_numpy(np.stack(pair)).permute(0, 3, 1, 2)
+        for pair in ((first, second), (first_iuv, second_iuv))
+    )
+    texture, visibility = extract_texture(
+        images.float(), iuvs, load_uv_layout().charts, FLICKER_TEXELS
+    )
+    both = (visibility[0, 0] * visibility[1, 0]).bool().numpy()
+    change = (texture[0] - texture[1]).abs().double().mean(0).numpy()
+    return _mean(change, both)
+
+
+def frechet_distance(first: Float[np.ndarray, "N D"], second: Float[np.ndarray, "M D"]) -> float:
+    """Fréchet distance of the normal distributions of two sets of feature vectors.
+
+    |m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)), covariances with N - 1; the trace of the root as
+    the sum of singular values of X1 X2', which needs no root of a product that may be singular.
+    Raises: ValueError where a set has fewer than two vectors.
+    Source: Heusel et al., NeurIPS 2017.
+    """
+    if min(len(first), len(second)) < 2:
+        raise ValueError("a distribution needs at least two feature vectors")
+    centred, means = [], []
+    for features in (first.astype(np.float64), second.astype(np.float64)):
+        means.append(features.mean(0))
+        rows = (features - means[-1]) / np.sqrt(len(features) - 1)
+        if len(rows) > rows.shape[1]:
+            rows = np.linalg.qr(rows, mode="r")  # has the same X' X in fewer rows
+        centred.append(rows)
+    # with Ci = Xi' Xi the eigenvalues of C1 C2 are the squared singular values of X1 X2'
+    shared = np.linalg.svd(centred[0] @ centred[1].T, compute_uv=False).sum()
+    spread = sum((rows**2).sum() for rows in centred)
+    distance = ((means[0] - means[1]) ** 2).sum() + spread - 2 * shared
+    return max(0.0, float(distance))  # equal sets may end a rounding error below
+
+
+def _mean(values: Float[np.ndarray, "H W"], mask: Mask | None) -> float:
+    if mask is not None:
+        values = values[mask]
+    return float(values.mean()) if values.size else float("nan")

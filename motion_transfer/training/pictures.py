@@ -1,0 +1,101 @@
+"""A picture of a person with its IUV, wherever it comes from."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import UInt8
+
+from motion_transfer.errors import InputError
+from motion_transfer.media.image import Photo, read_photo
+from motion_transfer.media.iuv_image import ChannelOrder
+from motion_transfer.render.source import list_iuv_names, read_person
+
+
+@dataclass(frozen=True)
+class PersonPicture:
+    """One person in one picture.
+
+    Attributes:
+        rgb: H x W x 3 uint8, not multiplied by alpha.
+        iuv: H x W x 3 uint8 (I, U, V), of that person only; at least one pixel is not background.
+        alpha: H x W uint8, what the person covers, where that is known; else None.
+    """
+
+    name: str
+    rgb: UInt8[np.ndarray, "H W 3"]
+    iuv: UInt8[np.ndarray, "H W 3"]
+    alpha: UInt8[np.ndarray, "H W"] | None
+
+    def digest(self) -> str:
+        """SHA-256 of the pixels, so that another encoding of the same picture is the same."""
+        content = hashlib.sha256()
+        for plane in (self.rgb, self.iuv, self.alpha):
+            if plane is not None:
+                content.update(repr(plane.shape).encode() + np.ascontiguousarray(plane).tobytes())
+        return content.hexdigest()
+
+
+class Picture(Protocol):
+    """Where a picture can be had.
+
+    Attributes:
+        name: the same picture always has the same one; it may hold `/`.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    def load(self) -> PersonPicture:
+        """Read or make it; called from several threads. Raises: InputError."""
+        ...
+
+
+@dataclass(frozen=True)
+class PhotoFile:
+    """A photo with its IUV, and perhaps its alpha, beside it.
+
+    The IUV is `STEM_IUV.png` or `STEM_iuv.png`; the alpha is the photo's own, or `STEM_alpha.png`.
+    Of several people the largest counts.
+    """
+
+    name: str
+    path: Path
+    iuv_order: ChannelOrder | None = None
+
+    @property
+    def iuv_path(self) -> Path:
+        """Raises: InputError if there is none."""
+        candidates = list_iuv_names(self.path)
+        for candidate in candidates:
+            if candidate.exists():
+                return candidate
+        raise InputError(
+            f"photo {self.path} has no IUV: neither {candidates[0].name} nor {candidates[1].name}"
+            " is beside it"
+        )
+
+    def load(self) -> PersonPicture:
+        """Raises: InputError if a file is missing or broken, sizes differ, or nobody is seen."""
+        photo = read_photo(self.path, "photo")
+        iuv = read_person(photo, self.iuv_path, "largest", self.iuv_order, "photo")
+        if not iuv.any():
+            raise InputError(f"photo {self.path}: its alpha leaves nobody of its IUV")
+        alpha = photo.alpha if photo.alpha is not None else self._alpha_beside(photo)
+        return PersonPicture(self.name, photo.rgb, iuv, alpha)
+
+    def _alpha_beside(self, photo: Photo) -> UInt8[np.ndarray, "H W"] | None:
+        path = self.path.with_name(f"{self.path.stem}_alpha.png")
+        if not path.exists():
+            return None
+        alpha = read_photo(path, "alpha").rgb[..., 0]
+        if alpha.shape != photo.rgb.shape[:2]:
+            raise InputError(
+                f"alpha {path} is {alpha.shape[1]} x {alpha.shape[0]}, but {photo.path} is"
+                f" {photo.rgb.shape[1]} x {photo.rgb.shape[0]}"
+            )
+        return np.ascontiguousarray(alpha)

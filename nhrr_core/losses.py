@@ -1,0 +1,177 @@
+"""The paper's losses (Sec. 3.5), as functions of tensors; every one is a scalar.
+
+A mean over nothing (no texel seen, no face seen) is 0 and passes no gradient.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from nhrr_core.config import COLOUR_CHANNELS
+from nhrr_core.errors import ConfigError, ShapeError
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossWeights:
+    """The lambdas of the generator's loss.
+
+    Source: the paper, Sec. 3.5. Departs from it: `alpha`, of the optional coverage channel, is this
+    project's.
+    Raises: ConfigError if one is negative or not finite.
+    """
+
+    perceptual: float = 10.0
+    adversarial: float = 1.0
+    identity: float = 5.0
+    texture: float = 1.0
+    alpha: float = 10.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not math.isfinite(value) or value < 0:
+                raise ConfigError(f"loss weight {field.name} is {value!r}; it must be 0 or more")
+
+
+def generator_loss(
+    terms: Mapping[str, Float[Tensor, ""]], weights: LossWeights
+) -> Float[Tensor, ""]:
+    """L_G, the weighted sum of the terms given; a variant leaves out those that it does not have.
+
+    Args:
+        terms: by the names of the fields of `LossWeights`.
+    Raises: ConfigError on a term without a weight, or on no term at all.
+    Source: the paper, Sec. 3.5, the last equation.
+    """
+    known = {field.name for field in fields(weights)}
+    unknown = sorted(set(terms) - known)
+    if unknown or not terms:
+        problem = f"unknown loss term {', '.join(unknown)}" if unknown else "no loss term"
+        raise ConfigError(f"{problem}; supported are {', '.join(sorted(known))}")
+    return torch.stack([getattr(weights, name) * term for name, term in terms.items()]).sum()
+
+
+def discriminator_loss(
+    real: Sequence[Float[Tensor, "B 1 _ _"]], fake: Sequence[Float[Tensor, "B 1 _ _"]]
+) -> Float[Tensor, ""]:
+    """Binary cross-entropy of real pairs called real and generated ones called generated.
+
+    1/2 * sum over scales of mean(-log s(real)) + mean(-log(1 - s(fake))), s the logistic function.
+
+    Args:
+        real, fake: the logits of `Discriminator`, the generated image (and the condition) detached.
+    Raises: ShapeError if they have different numbers of scales, or none.
+    Source: the paper, Sec. 3.5; the sum over scales and the half from Pix2PixHD.
+    """
+    _check_same_number(real, fake, "scales")
+    terms = [_cross_entropy(logits, 1.0) for logits in real]
+    terms += [_cross_entropy(logits, 0.0) for logits in fake]
+    return torch.stack(terms).sum() / 2
+
+
+def adversarial_loss(fake: Sequence[Float[Tensor, "B 1 _ _"]]) -> Float[Tensor, ""]:
+    """L_adv of the generator: binary cross-entropy of generated images called real.
+
+    Sum over scales of mean(-log s(fake)), the form that does not saturate.
+
+    Raises: ShapeError if there is no scale.
+    Source: the paper, Sec. 3.5; the sum over scales from Pix2PixHD.
+    """
+    _check_same_number(fake, fake, "scales")
+    return torch.stack([_cross_entropy(logits, 1.0) for logits in fake]).sum()
+
+
+def perceptual_loss(
+    generated: Sequence[Float[Tensor, "B _ _ _"]],
+    truth: Sequence[Float[Tensor, "B _ _ _"]],
+    weights: Sequence[float],
+) -> Float[Tensor, ""]:
+    """L_p: how far the activations of a frozen network are apart, layer by layer.
+
+    Sum over layers j of weights[j] * mean|p_j(generated) - p_j(truth)|.
+
+    Args:
+        generated, truth: activations of the same layers; take the truth's without gradients.
+        weights: one a layer. Pix2PixHD gives VGG-19's relu1_1 to relu5_1 the weights 1/32, 1/16,
+            1/8, 1/4, 1; the paper's equation, read literally, has 1 for all.
+    Raises: ShapeError if the numbers of layers and weights differ, or are 0, or if the two
+        activations of a layer differ in shape.
+    Source: the paper, Sec. 3.5, Eq. 5. Departs from it: the weights.
+    """
+    _check_same_number(generated, truth, "layers")
+    _check_same_number(generated, weights, "layers and weights")
+    terms = []
+    for ours, theirs, weight in zip(generated, truth, weights, strict=True):
+        if ours.shape != theirs.shape:  # l1_loss would broadcast, with a warning
+            raise ShapeError(f"activations {list(ours.shape)} and {list(theirs.shape)} differ")
+        terms.append(weight * F.l1_loss(ours, theirs))
+    return torch.stack(terms).sum()
+
+
+def texture_loss(
+    feature_map: Float[Tensor, "B D T T"],
+    source: tuple[Float[Tensor, "B 3 T T"], Float[Tensor, "B 1 T T"]],
+    target: tuple[Float[Tensor, "B 3 T T"], Float[Tensor, "B 1 T T"]],
+) -> Float[Tensor, ""]:
+    """L_tex: the first three channels of the feature map are the colours of the person.
+
+    The sum of two l1 distances, to the partial texture of the source and to that of the target,
+    each a mean over colours and over the texels visible in any image of the batch.
+
+    Args:
+        feature_map: of the source, D at least 3.
+        source, target: texture and visibility (0 or 1) as `extract_texture` returns them.
+    Raises: ShapeError if the feature map has fewer than three channels.
+    Source: the paper, Sec. 3.5, intermediate in-painting loss. Departs from it: no.
+    """
+    if feature_map.shape[1] < COLOUR_CHANNELS:
+        raise ShapeError(f"feature map {list(feature_map.shape)} has no three colour channels")
+    colours = feature_map[:, :COLOUR_CHANNELS]
+    return _visible_l1(colours, *source) + _visible_l1(colours, *target)
+
+
+def face_identity_loss(
+    generated: Float[Tensor, "B E"], truth: Float[Tensor, "B E"], seen: Bool[Tensor, " B"]
+) -> Float[Tensor, ""]:
+    """L_face: mean absolute difference of two faces' embeddings, over the images with a face.
+
+    Args:
+        generated, truth: N_face of the face crops; take the truth's without gradients.
+        seen: False where the crop shows no face; such an image counts for nothing.
+    Source: the paper, Sec. 3.5, Eq. 6, |N_face(generated) - N_face(truth)|. It does not say whether
+        |.| is a sum or a mean over the embedding; a sum over 512 values would outweigh the rest.
+    """
+    difference = (generated - truth).abs().mean(dim=1)
+    return torch.where(seen, difference, 0).sum() / seen.sum().clamp_min(1)
+
+
+def alpha_loss(
+    alpha: Float[Tensor, "B 1 H W"], coverage: Float[Tensor, "B 1 H W"]
+) -> Float[Tensor, ""]:
+    """Mean absolute error of RenderNet's fourth output, both in [-1, 1] (1 is the person).
+
+    Source: this project's; the paper renders no alpha.
+    """
+    return F.l1_loss(alpha, coverage)
+
+
+def _cross_entropy(logits: Tensor, label: float) -> Tensor:
+    return F.binary_cross_entropy_with_logits(logits, torch.full_like(logits, label))
+
+
+def _visible_l1(colours: Tensor, texture: Tensor, visibility: Tensor) -> Tensor:
+    texels = visibility.sum().clamp_min(1)
+    return ((colours - texture).abs() * visibility).sum() / (COLOUR_CHANNELS * texels)
+
+
+def _check_same_number(first: Sequence[object], second: Sequence[object], what: str) -> None:
+    if len(first) != len(second) or not first:
+        raise ShapeError(f"{len(first)} and {len(second)} {what}; give equally many, at least one")
