@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int32
 from scipy.sparse import csr_array
 
-from motion_transfer.people.extra import require_people
+from motion_transfer.people.extra import one_thread, require_people, start_warp
 
 FIRST_USE = "preparing the body model, once on this machine, two to three minutes"
 
@@ -162,9 +162,7 @@ class BodyModel:
     """
 
     def __init__(self) -> None:
-        import warp
-
-        warp.config.quiet = True  # no banner
+        start_warp()
         from anny import Anny
 
         self._anny = Anny(phenotypes="all", skinning_method="lbs").float()
@@ -184,7 +182,7 @@ class BodyModel:
         import torch
 
         numbers = {name: torch.tensor([value]) for name, value in asdict(shape).items()}
-        with torch.no_grad():
+        with one_thread(), torch.no_grad():
             coefficients = self._anny.get_phenotype_blendshape_coefficients(**numbers)
             rest = self._anny.get_rest_model(coefficients)
         points = rest["rest_vertices"][0].numpy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float32, Float64
@@ -32,7 +33,7 @@ class Camera:
     elevation: float = 0.0
     roll: float = 0.0
 
-    @property
+    @cached_property
     def axes(self) -> Float64[np.ndarray, "3 3"]:
         """Rows: to the right of the picture, down, and into it."""
         ca, sa = np.cos(self.azimuth), np.sin(self.azimuth)

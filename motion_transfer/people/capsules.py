@@ -8,6 +8,7 @@ taken as symmetric.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -145,17 +146,15 @@ class Capsules:
 
     def _measure(self, model: BodyModel, body: Body, segments: dict) -> None:
         """Radii of limbs; segments and radii of the trunk."""
-        owner = np.asarray(model.weights.matrix.argmax(axis=1)).ravel()
-        names = np.array(body.skeleton.names)[owner]
-        points = body.points.astype(np.float64)
+        skin_of = _skin_parts(model)
         for limb, (start, end) in segments.items():
             low = _SPAN.get(limb, 0.0)
-            skin = points[[n.endswith(".L") and n.startswith(_SKIN[limb]) for n in names]]
+            skin = body.points[skin_of[limb]].astype(np.float64)
             radii = _radii(skin, start + low * (end - start), end)
             if limb in ("hand", "foot"):  # flat: between half the thickness and half the width
                 radii = 0.75 * radii[0], 0.75 * radii[1]
             self.radii[[INDEX[f"{limb}.L"], INDEX[f"{limb}.R"]]] = radii
-        trunk = points[[n.startswith(("spine", "pelvis", "upperleg01", "root")) for n in names]]
+        trunk = body.points[skin_of["trunk"]].astype(np.float64)
         hips = body.joint("upperleg01.L")[2]
         heights = [hips - 0.01, body.joint("spine04")[2], body.joint("spine03")[2] + 0.06]
         heights.append(body.joint("spine01")[2] + 0.02)
@@ -163,7 +162,8 @@ class Capsules:
             self._trunk[i], self.radii[i] = _slab(
                 trunk[np.abs(trunk[:, 2] - height) < 0.04], height
             )
-        skull = points[(names == "head") & (points[:, 2] > body.joint("head")[2])]
+        skull = body.points[skin_of["head"]].astype(np.float64)
+        skull = skull[skull[:, 2] > body.joint("head")[2]]
         width = np.ptp(skull[:, 0]) / 2
         middle = (skull[:, 1].min() + skull[:, 1].max()) / 2
         self._trunk[4] = [[0, middle, body.joint("head")[2]], [0, middle, body.height - width]]
@@ -263,6 +263,21 @@ class Capsules:
         slope = self.radii[:, 1] - self.radii[:, 0]
         reach = self.radii[FIRST, 0] + s * slope[FIRST] + self.radii[SECOND, 0] + t * slope[SECOND]
         return Contacts(distance - reach, near, far, between / np.maximum(distance, 1e-6)[:, None])
+
+
+@lru_cache(maxsize=1)
+def _skin_parts(model: BodyModel) -> dict[str, np.ndarray]:
+    """Which vertices belong to each of the left limbs, the trunk and the head, for every shape."""
+    owner = np.asarray(model.weights.matrix.argmax(axis=1)).ravel()
+    names = [model.skeleton.names[bone] for bone in owner]
+    parts = {
+        limb: [i for i, n in enumerate(names) if n.endswith(".L") and n.startswith(bones)]
+        for limb, bones in _SKIN.items()
+    }
+    trunk = ("spine", "pelvis", "upperleg01", "root")
+    parts["trunk"] = [i for i, name in enumerate(names) if name.startswith(trunk)]
+    parts["head"] = [i for i, name in enumerate(names) if name == "head"]
+    return {part: np.array(index) for part, index in parts.items()}
 
 
 def _radii(skin: Points, start: np.ndarray, end: np.ndarray) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motion_transfer.people.outfits import Top, Trousers
+from motion_transfer.people.clothes import Skirt, Top, Trousers
 
 _FAR = np.float32(1.0)
 _SHOULDER = 0.165  # half the breadth between the armholes on the template
@@ -86,6 +86,7 @@ def opening(top: Top, at: Places, levels: Levels) -> np.ndarray:
     """Distance from the edge of an open front; far where there is none."""
     if top.gap <= 0:
         return np.full(at.x.shape, _FAR)
+    # cloth swings apart lower down
     wider = np.clip(1 + 1.5 * (levels.armpit - at.z), 0.5, 2)
     return np.where(at.y < -0.03, np.abs(at.x) - np.float32(top.gap) * wider, _FAR)
 
@@ -118,3 +119,12 @@ def trousers_depth(trousers: Trousers, at: Places, levels: Levels) -> np.ndarray
     """How far inside trousers, the waist and the ends of the legs considered."""
     end = np.float32(trousers.length * levels.leg) - at.leg
     return np.minimum(waistline(trousers, at, levels), end)
+
+
+def skirt_depth(skirt: Skirt, at: Places, levels: Levels) -> np.ndarray:
+    """How far inside a skirt the skin lies; the last 6 cm above the hem count as seen."""
+    below = np.where(at.arm > -0.5, -_FAR, np.float32(levels.waist + skirt.top) - at.z)
+    above = np.float32(skirt.length * levels.leg - 0.06) - at.leg
+    return np.where(
+        at.leg > -0.5, np.minimum(below, np.maximum(above, at.z - levels.crotch)), below
+    )

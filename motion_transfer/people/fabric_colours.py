@@ -68,15 +68,16 @@ f4e8bd 5a77a0 f6f6f4 ef6f63
 """
 
 
-def _from_hex(text: str) -> Colour:
-    red, green, blue = bytes.fromhex(text)
-    return (red / 255, green / 255, blue / 255)
+def from_hex(text: str) -> tuple[Colour, ...]:
+    """Colours written as rrggbb, with blanks between them."""
+    codes = map(bytes.fromhex, text.split())
+    return tuple((red / 255, green / 255, blue / 255) for red, green, blue in codes)
 
 
-_SHADES = [tuple(_from_hex(shade) for shade in shades.split()) for _, shades in _FAMILIES.values()]
+_SHADES = [from_hex(shades) for _, shades in _FAMILIES.values()]
 _SHARES = np.array([share for share, _ in _FAMILIES.values()])
 _SHARES = _SHARES / _SHARES.sum()
-_SETS = [tuple(map(_from_hex, line.split())) for line in _COMBINATIONS.strip().splitlines()]
+_SETS = [from_hex(line) for line in _COMBINATIONS.strip().splitlines()]
 
 
 def luminance(colour: Colour) -> float:
@@ -131,7 +132,8 @@ def sample_palette(
     else:
         chosen = [sample_colour(rng)]
         if rng.random() < 0.5:  # a colour and the neutral that sets it off
-            neutral = _from_hex("f3efe6") if luminance(chosen[0]) < 0.5 else _from_hex("1b1d26")
+            pale, dark = from_hex("f3efe6 1b1d26")
+            neutral = pale if luminance(chosen[0]) < 0.5 else dark
             chosen.append(_as_dyed(rng, neutral))
     while len(chosen) < count:
         chosen.append(_tone_of(rng, chosen[int(rng.integers(len(chosen)))]))

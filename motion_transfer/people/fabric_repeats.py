@@ -15,8 +15,10 @@ import numpy as np
 from jaxtyping import Float32, Int, UInt8
 
 # Repeats of small patterns are laid side by side until they span this many texels, because the
-# count of texels must be whole: rounding then changes the resolution by 1 % at most.
-_LEAST_TEXELS = 48
+# count of texels must be whole: rounding then changes the resolution by 2 % at most.
+_LEAST_TEXELS = 24
+
+_LEAST_SAMPLES = 20  # of a pattern along its period, before they are averaged over texels
 
 Colours = Float32[np.ndarray, "N 3"]
 """The fabric's colours, sRGB 0..255, ground first."""
@@ -44,12 +46,19 @@ def span(period_metres: float, texels_per_metre: float) -> tuple[int, int]:
 
 
 def _threads(
-    widths: Float32[np.ndarray, " B"], colours: Float32[np.ndarray, "B 3"], periods: int, texels: int
+    widths: Float32[np.ndarray, " B"],
+    colours: Float32[np.ndarray, "B 3"],
+    periods: int,
+    texels: int,
 ) -> Float32[np.ndarray, "T 3"]:
     """Bands of colour averaged exactly over each texel; `widths` are shares of one period."""
     edges = np.concatenate([[0.0], np.cumsum(np.tile(widths / widths.sum(), periods))])
-    area = np.concatenate([np.zeros((1, 3)), np.cumsum(np.diff(edges)[:, None] *
-                           np.tile(colours, (periods, 1)), axis=0)])
+    area = np.concatenate(
+        [
+            np.zeros((1, 3)),
+            np.cumsum(np.diff(edges)[:, None] * np.tile(colours, (periods, 1)), axis=0),
+        ]
+    )
     at = np.linspace(0, periods, texels + 1)
     summed = np.stack([np.interp(at, edges, area[:, c]) for c in range(3)], axis=1)
     return (np.diff(summed, axis=0) * (texels / periods)).astype(np.float32)
@@ -71,20 +80,26 @@ def _sampled(
         pick: (u, v) -> which colour, both in periods along the width and the height.
         period: width and height in metres.
     """
-    (count_u, wide), (count_v, high) = (span(length, texels_per_metre) for length in period)
-    finer = int(np.clip(400 // max(wide, high), 2, 5))
-    u = (np.arange(wide * finer, dtype=np.float32) + 0.5) * (count_u / (wide * finer))
-    v = (np.arange(high * finer, dtype=np.float32) + 0.5) * (count_v / (high * finer))
-    index = pick(u[None] % 1, v[:, None] % 1)
     table = np.clip(np.rint(colours), 0, 255).astype(np.uint8)
-    fine = table[np.broadcast_to(index, (len(v), len(u)))]
-    pixels = cv2.resize(fine, (wide, high), interpolation=cv2.INTER_AREA)
+    (count_u, wide), (count_v, high) = (span(length, texels_per_metre) for length in period)
+    finer = int(np.clip(160 // max(wide, high), 2, 4))
+    columns, rows = (
+        max(_LEAST_SAMPLES, round(texels * finer / count))
+        for texels, count in ((wide, count_u), (high, count_v))
+    )
+    u = (np.arange(columns, dtype=np.float32) + 0.5) / np.float32(columns)
+    v = (np.arange(rows, dtype=np.float32) + 0.5) / np.float32(rows)
+    fine = table[np.broadcast_to(pick(u[None], v[:, None]), (rows, columns))]
+    if min(period) * texels_per_metre < 1:  # no texel can show it
+        mean = np.rint(fine.mean(axis=(0, 1))).astype(np.uint8)
+        pixels = np.full((high, wide, 3), mean)
+    else:
+        several = np.tile(fine, (count_v, count_u, 1))
+        pixels = cv2.resize(several, (wide, high), interpolation=cv2.INTER_AREA)
     return Repeat(pixels, count_v * period[1], count_u * period[0])
 
 
-def blended(
-    colours: Colours, share: Float32[np.ndarray, "H W"]
-) -> UInt8[np.ndarray, "H W 3"]:
+def blended(colours: Colours, share: Float32[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
     """The colours in turn as `share` goes from 0 to 1, blended in between."""
     at = np.linspace(0, len(colours) - 1, 256)
     ramp = np.stack([np.interp(at, np.arange(len(colours)), colours[:, c]) for c in range(3)], 1)
@@ -121,16 +136,14 @@ def colour_block(
     )
 
 
-def _crossed(
-    bands: Float32[np.ndarray, "T 3"], periods: int, scale: float
-) -> Repeat:
+def _crossed(bands: Float32[np.ndarray, "T 3"], periods: int, scale: float) -> Repeat:
     """Warp and weft of the same bands, each showing half: a balanced weave."""
     pixels = _to_uint8((bands[None] + bands[:, None]) * 0.5)
     return Repeat(pixels, periods * scale, periods * scale)
 
 
 def checks(
-    colours: Colours, scale: float, rng: np.random.Generator, texels_per_metre: float
+    colours: Colours, scale: float, _rng: np.random.Generator, texels_per_metre: float
 ) -> Repeat:
     """Gingham: two colours in even bands, crossed."""
     periods, texels = span(scale, texels_per_metre)
@@ -174,7 +187,7 @@ def herringbone(
     colours: Colours, scale: float, rng: np.random.Generator, texels_per_metre: float
 ) -> Repeat:
     """Twill whose diagonal turns every half period."""
-    lines = int(rng.integers(3, 6))
+    lines = int(rng.integers(2, 5))
 
     def pick(u: np.ndarray, v: np.ndarray) -> np.ndarray:
         slant = np.abs(u - 0.5)
@@ -198,7 +211,7 @@ def chevron(
 
 
 def houndstooth(
-    colours: Colours, scale: float, rng: np.random.Generator, texels_per_metre: float
+    colours: Colours, scale: float, _rng: np.random.Generator, texels_per_metre: float
 ) -> Repeat:
     """Four dark and four light threads each way, woven as a 2/2 twill."""
 

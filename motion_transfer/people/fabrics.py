@@ -10,15 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Float32
 
 from motion_transfer.errors import InputError
 from motion_transfer.people import fabric_motifs as motifs
 from motion_transfer.people import fabric_repeats as repeats
-from motion_transfer.people.fabric_colours import Colour, sample_colour, sample_palette
-from motion_transfer.people.fabric_grain import WEAVES, grain, smooth_noise
+from motion_transfer.people.fabric_colours import Colour, from_hex, sample_colour, sample_palette
+from motion_transfer.people.fabric_grain import WEAVES, grain
 from motion_transfer.people.fabric_panel import (
     gradient,
     lay,
@@ -27,6 +26,7 @@ from motion_transfer.people.fabric_panel import (
     two_yarns,
     with_grain,
 )
+from motion_transfer.people.smooth_noise import smooth_noise
 
 __all__ = ["KINDS", "Colour", "Fabric", "paint_fabric", "sample_colour", "sample_fabric"]
 
@@ -61,9 +61,7 @@ _KINDS: dict[str, _Kind] = {
     "denim": _Kind(0.06, (2, 2), (0.001, 0.002), weaves=("twill",)),
     "gradient": _Kind(0.015, (2, 3), (0.3, 1.2), (0, 0, 0, 2, 1), ("jersey", "satin")),
     "tie_dye": _Kind(0.012, (3, 4), (0.08, 0.25), weaves=("jersey",)),
-    "stripes": _Kind(
-        0.10, (2, 4), (0.004, 0.08), (0, 0, 0, 0, 1, 1, 0.5), paint=repeats.stripes
-    ),
+    "stripes": _Kind(0.10, (2, 4), (0.004, 0.08), (0, 0, 0, 0, 1, 1, 0.5), paint=repeats.stripes),
     "colour_block": _Kind(0.02, (2, 3), (0.4, 1.2), (0, 0, 0, 1), paint=repeats.colour_block),
     "checks": _Kind(0.04, (2, 2), (0.006, 0.05), (0, 0, 0, 0.5), ("woven",), repeats.checks),
     "plaid": _Kind(0.05, (3, 4), (0.03, 0.15), (0, 0, 0, 0, 0.5), ("woven",), repeats.plaid),
@@ -72,10 +70,8 @@ _KINDS: dict[str, _Kind] = {
     "chevron": _Kind(0.01, (2, 4), (0.03, 0.12), (0, 0, 1), paint=repeats.chevron),
     "argyle": _Kind(0.01, (3, 3), (0.04, 0.12), weaves=("jersey",), paint=repeats.argyle),
     "knit": _Kind(0.06, (1, 2), (0.003, 0.011), weaves=("melange", "jersey"), paint=repeats.knit),
-    "dots": _Kind(0.035, (2, 3), (0.006, 0.06), (0, 0, 0.5), ("woven", "satin"), repeats.dots),
-    "flowers": _Kind(
-        0.055, (3, 4), (0.02, 0.15), _ANY_TURN, ("woven", "satin"), motifs.flowers
-    ),
+    "dots": _Kind(0.035, (2, 3), (0.004, 0.05), (0, 0, 0.5), ("woven", "satin"), repeats.dots),
+    "flowers": _Kind(0.055, (3, 4), (0.02, 0.15), _ANY_TURN, ("woven", "satin"), motifs.flowers),
     "leaves": _Kind(0.015, (2, 4), (0.06, 0.25), _ANY_TURN, ("woven", "satin"), motifs.leaves),
     "abstract": _Kind(0.015, (3, 4), (0.05, 0.2), _ANY_TURN, ("woven", "satin"), motifs.abstract),
     "leopard": _Kind(0.012, (2, 2), (0.015, 0.05), (0, 1), ("jersey", "satin"), motifs.leopard),
@@ -124,9 +120,7 @@ class Fabric:
             )
         least = _KINDS[self.kind].colours[0]
         if len(self.colours) < least:
-            raise InputError(
-                f"{self.kind} needs {least} colours or more, not {len(self.colours)}"
-            )
+            raise InputError(f"{self.kind} needs {least} colours or more, not {len(self.colours)}")
         if any(not 0 <= value <= 1 for colour in self.colours for value in colour):
             raise InputError(f"colours must lie in 0..1, not {self.colours}")
         if not self.scale > 0:
@@ -161,7 +155,7 @@ def sample_fabric(
     kind = _KINDS[name]
     count = int(rng.integers(kind.colours[0], kind.colours[1] + 1))
     weave = str(rng.choice(kind.weaves))
-    loud = 0.07 if weave in ("melange", "twill") else 0.035
+    loud = 0.05 if name in ("melange", "denim") else 0.028
     return Fabric(
         kind=name,
         colours=_colours_for(name, rng, count, palette),
@@ -173,21 +167,32 @@ def sample_fabric(
     )
 
 
-# Cloths that come in colours of their own.
-_DENIM = (((0.10, 0.14, 0.23), (0.30, 0.37, 0.48)), ((0.20, 0.29, 0.43), (0.45, 0.55, 0.67)),
-          ((0.39, 0.51, 0.66), (0.72, 0.79, 0.86)), ((0.09, 0.09, 0.10), (0.25, 0.25, 0.27)),
-          ((0.52, 0.53, 0.55), (0.74, 0.75, 0.76)), ((0.86, 0.86, 0.84), (0.97, 0.97, 0.96)))  # fmt: skip
-_LEOPARD = (((0.78, 0.62, 0.42), (0.13, 0.09, 0.07)), ((0.85, 0.76, 0.62), (0.17, 0.12, 0.09)),
-            ((0.66, 0.65, 0.64), (0.09, 0.09, 0.10)), ((0.93, 0.90, 0.85), (0.16, 0.15, 0.15)))  # fmt: skip
+# Cloths that come in colours of their own, with how often each is seen.
+_OWN_COLOURS: dict[str, tuple[tuple[float, str], ...]] = {
+    "denim": (
+        (0.25, "1a243b 4d5e7a"),
+        (0.30, "334a6e 738cab"),
+        (0.20, "6382a8 b8c9db"),
+        (0.12, "17171a 404045"),
+        (0.06, "85878c bdbfc2"),
+        (0.07, "dbdbd6 f7f7f5"),
+    ),
+    "leopard": (
+        (0.4, "c79e6b 211712"),
+        (0.3, "d9c29e 2b1f17"),
+        (0.15, "a8a6a3 17171a"),
+        (0.15, "ede6d9 292626"),
+    ),
+    "zebra": ((0.6, "f3f1ec 17171a"), (0.25, "d9cdb8 1d1815"), (0.15, "77797d 121214")),
+}
 
 
 def _colours_for(
     kind: str, rng: np.random.Generator, count: int, palette: Sequence[Colour] | None
 ) -> tuple[Colour, ...]:
-    if palette is None and kind == "denim":
-        return _DENIM[rng.choice(len(_DENIM), p=(0.25, 0.3, 0.2, 0.12, 0.06, 0.07))]
-    if palette is None and kind == "leopard":
-        return _LEOPARD[rng.integers(len(_LEOPARD))]
+    if palette is None and kind in _OWN_COLOURS:
+        own = _OWN_COLOURS[kind]
+        return from_hex(own[rng.choice(len(own), p=[share for share, _ in own])][1])
     return sample_palette(rng, count, palette)
 
 
@@ -211,9 +216,10 @@ def paint_fabric(
         max(1, round(height_metres * texels_per_metre)),
         max(1, round(width_metres * texels_per_metre)),
     )
-    rng = np.random.default_rng(fabric.seed)
+    # The grain has its own stream: the pattern must not depend on the panel's size.
+    rng, grain_rng = (np.random.default_rng((fabric.seed, stream)) for stream in (0, 1))
     colours = np.array(fabric.colours, np.float32) * 255
-    threads = grain(fabric.weave, rng, shape, texels_per_metre)
+    threads = grain(fabric.weave, grain_rng, shape, texels_per_metre)
     painter = _KINDS[fabric.kind].paint
     start = rng.random(2)
     if painter is not None:
@@ -225,7 +231,7 @@ def paint_fabric(
         cloth = tie_dye(colours, fabric.scale, rng, shape, texels_per_metre)
     elif fabric.kind == "denim":
         # Wear: about the knees and the seat the white weft shows more.
-        threads = cv2.scaleAdd(smooth_noise(rng, 0.25, shape, texels_per_metre), 0.8, threads)
+        threads += 0.35 * smooth_noise(shape, 0.25 * texels_per_metre, rng)
         return two_yarns(colours, 0.3, threads, fabric.grain)
     elif fabric.kind == "melange":
         return two_yarns(colours, 0.3, threads, fabric.grain)

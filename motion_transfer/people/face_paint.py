@@ -6,13 +6,13 @@ is noise: mottling, freckles, single hairs. Lengths are metres on the template's
 
 from __future__ import annotations
 
-from functools import cache
-
 import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from motion_transfer.people.faces import Colour, Face, Hairline, greyed
+from motion_transfer.people.brushes import Grid, Image, lay, noise, ramp, tint, to_linear
+from motion_transfer.people.faces import Face, greyed
+from motion_transfer.people.growth import MOUTH_Z, bald_crown, beard_cover, hairline_height
 from motion_transfer.people.skin_atlas import (
     EYE_PX,
     EYE_SPAN,
@@ -22,98 +22,25 @@ from motion_transfer.people.skin_atlas import (
     SkinAtlas,
 )
 
-Grid = Float32[np.ndarray, "rows columns"]
-Image = Float32[np.ndarray, "rows columns 3"]
-
-MOUTH_Z = 1.6492
 _EYE_X, _EYE_Z = 0.0330, 1.7208  # the middle of the opening between the lids
 _HALF = WIDTH // 2
-_NOISE = 1024
-
-
-def to_linear(colour: Colour) -> Float32[np.ndarray, "3"]:
-    """sRGB to linear RGB."""
-    rgb = np.asarray(colour, np.float32)
-    return np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-@cache
-def _noises() -> dict[str, Float32[np.ndarray, "1024 1024"]]:
-    """Tiles of noise with mean 0 and deviation 1: of single texels, and of blotches."""
-    rng = np.random.default_rng(20)
-    fine = rng.standard_normal((_NOISE, _NOISE)).astype(np.float32)
-    out = {"fine": fine}
-    for name, sigma in (("pores", 0.8), ("spots", 1.3), ("blotches", 9.0)):
-        soft = cv2.GaussianBlur(np.tile(fine, (2, 2)), (0, 0), sigma)[512:1536, 512:1536]
-        out[name] = soft / soft.std()
-    return out
-
-
-def noise(name: str, seed: int, rows: int, columns: int) -> Grid:
-    """A window of a noise tile; which one, the seed says."""
-    x, y = (seed * 7919) % (_NOISE - columns), (seed // 3 * 104729) % (_NOISE - rows)
-    return _noises()[name][y : y + rows, x : x + columns]
-
-
-def ramp(values: Grid, low: float, high: float) -> Grid:
-    """0 at `low` and before, 1 at `high` and beyond, smooth between."""
-    t = np.clip((values - np.float32(low)) * np.float32(1 / (high - low)), 0, 1)
-    return t * t * (3 - 2 * t)
-
-
-def lay(image: Image, paint: Float32[np.ndarray, "3"], coverage: Grid) -> None:
-    """Lay a paint over an image, in place."""
-    image += coverage[..., None] * (paint - image)
-
-
-def tint(image: Image, factor: tuple[float, float, float], strength: Grid) -> None:
-    """Multiply an image by a colour, in place: by the whole of it where the strength is 1."""
-    image *= 1 + strength[..., None] * (np.asarray(factor, np.float32) - 1)
-
-
-def hairline_height(angle: Float32[np.ndarray, " N"], line: Hairline) -> Float32[np.ndarray, " N"]:
-    """Height (template, metres) at which the scalp's hair begins, by angle from the front."""
-    degrees = np.abs(np.degrees(angle))
-    raised, back = line.raised / 1000, line.temples / 1000
-    front = 1.790 + raised - line.peak / 1000 * np.exp(-((degrees / 8) ** 2))
-    knots = (
-        (0, 0.0),
-        (15, 0.001),
-        (34, 0.004 + back),
-        (48, -0.006 + 0.8 * back),
-        (58, -0.030 + 0.3 * back),
-        (65, -0.060),
-        (69, -0.082),
-        (74, -0.088),
-        (78, -0.062),
-        (90, -0.054),
-        (103, -0.064),
-        (112, -0.100),
-        (130, -0.140),
-        (155, -0.158),
-        (180, -0.158),
-    )
-    at, drop = np.array(knots).T
-    # below the temples the line keeps its place however high the front is
-    keep = 1 - ramp(degrees, 40, 62)
-    return (1.790 + np.interp(degrees, at, drop) + keep * (front - 1.790)).astype(np.float32)
 
 
 def paint_skin(face: Face, atlas: SkinAtlas) -> Float32[np.ndarray, "rows columns 4"]:
     """The skin's texture, linear RGB and relief: the head above, the strip of other skin below."""
     skin = to_linear(face.complexion.colour)
-    half = np.empty((HEAD_ROWS, _HALF, 3), np.float32)
-    half[:] = skin
+    half = np.empty((3, HEAD_ROWS, _HALF), np.float32)
+    half[:] = skin[:, None, None]
     _paint_flush(half, face, atlas)
     _paint_lines(half, face, atlas)
     _paint_eyelids(half, face, atlas)
     _paint_nose(half, atlas)
     _paint_lips(half, face, atlas, skin)
     texture = np.zeros((HEAD_ROWS + STRIP_ROWS, WIDTH, 4), np.float32)
-    head = np.concatenate([half[:, ::-1], half], 1)
+    head = np.concatenate([half[:, :, ::-1], half], 2)
     _paint_mottling(head, face)
     _paint_hair(head, face, atlas)
-    texture[:HEAD_ROWS, :, :3] = head
+    cv2.mixChannels([*head], [texture[:HEAD_ROWS]], [0, 0, 1, 1, 2, 2])
     texture[HEAD_ROWS:, :, :3] = _strip(face, skin)
     return texture
 
@@ -139,10 +66,10 @@ def _paint_flush(half: Image, face: Face, atlas: SkinAtlas) -> None:
     nose = np.exp(-((x / 0.015) ** 2) - ((z - 1.684) / 0.011) ** 2)
     chin = 0.4 * np.exp(-((x / 0.02) ** 2) - ((z - 1.612) / 0.012) ** 2)
     flush = face.complexion.flush * np.maximum(np.maximum(cheeks, 0.8 * nose), chin)
-    tint(half[rows, columns], (1.0, 0.80, 0.78), flush)
-    tint(half[rows, columns], (1.0, 0.62, 0.62), 0.7 * face.make_up.blush * cheeks)
+    tint(half[:, rows, columns], (1.0, 0.80, 0.78), flush)
+    tint(half[:, rows, columns], (1.0, 0.62, 0.62), 0.7 * face.make_up.blush * cheeks)
     ear = (np.degrees(atlas.angle[whole]) > 76) & (z < 1.73) & (z > 1.67)
-    tint(half[rows, columns], (1.0, 0.84, 0.80), 0.5 * ear.astype(np.float32))
+    tint(half[:, rows, columns], (1.0, 0.84, 0.80), 0.5 * ear.astype(np.float32))
 
 
 def _paint_lines(half: Image, face: Face, atlas: SkinAtlas) -> None:
@@ -158,14 +85,16 @@ def _paint_lines(half: Image, face: Face, atlas: SkinAtlas) -> None:
     forehead = sum(np.exp(-(((z - at + bend) / 0.0011) ** 2)) for at in (1.757, 1.767, 1.778))
     forehead = forehead * (1 - ramp(x, 0.025, 0.045)) * ramp(strength - 0 * x, 0.3, 1)
     bags = np.exp(-(((x - 0.031) / 0.011) ** 2) - ((z - 1.7070) / 0.0022) ** 2)
-    tint(half[rows, columns], (0.80, 0.70, 0.66), strength * (fold + 0.5 * forehead + 0.7 * bags))
+    tint(
+        half[:, rows, columns], (0.80, 0.70, 0.66), strength * (fold + 0.5 * forehead + 0.7 * bags)
+    )
 
 
 def _paint_eyelids(half: Image, face: Face, atlas: SkinAtlas) -> None:
     rows, columns, whole = _window(atlas, (5, 45), (1.700, 1.750))
     x, z = _coordinates(atlas, rows, whole)
     away = atlas.opening[rows, whole]
-    image, make_up = half[rows, columns], face.make_up
+    image, make_up = half[:, rows, columns], face.make_up
     above = ramp(z - 0.10 * (x - _EYE_X), _EYE_Z - 0.0010, _EYE_Z + 0.0015)
     socket = np.exp(-(((x - 0.030) / 0.016) ** 2) - ((z - 1.7215) / 0.012) ** 2)
     tint(image, (0.84, 0.76, 0.76), 0.6 * socket)
@@ -189,17 +118,15 @@ def _paint_nose(half: Image, atlas: SkinAtlas) -> None:
     rows, columns, whole = _window(atlas, (0, 25), (1.664, 1.70))
     x, z = _coordinates(atlas, rows, whole)
     nostril = np.exp(-(((np.abs(x) - 0.0088) / 0.0042) ** 4) - ((z - 1.6752) / 0.0026) ** 4)
-    tint(half[rows, columns], (0.20, 0.13, 0.11), 0.85 * nostril)
+    tint(half[:, rows, columns], (0.20, 0.13, 0.11), 0.85 * nostril)
     wing = np.exp(-(((x - 0.0200 + 0.12 * (z - 1.681)) / 0.0020) ** 2) - ((z - 1.681) / 0.007) ** 2)
-    tint(half[rows, columns], (0.66, 0.54, 0.52), 0.5 * wing)
+    tint(half[:, rows, columns], (0.66, 0.54, 0.52), 0.5 * wing)
 
 
-def _paint_lips(
-    half: Image, face: Face, atlas: SkinAtlas, skin: Float32[np.ndarray, "3"]
-) -> None:
+def _paint_lips(half: Image, face: Face, atlas: SkinAtlas, skin: Float32[np.ndarray, " 3"]) -> None:
     rows, columns, whole = _window(atlas, (0, 30), (1.622, 1.672))
     x, z = _coordinates(atlas, rows, whole)
-    image = half[rows, columns]
+    image = half[:, rows, columns]
     across = np.clip(x / 0.0255, 0, 1)
     full = 0.8 + 0.4 * face.lip_fullness
     bow = 1 - 0.22 * np.exp(-((x / 0.0035) ** 2))
@@ -221,14 +148,15 @@ def _paint_lips(
 
 
 def _paint_mottling(head: Image, face: Face) -> None:
-    blotches = noise("blotches", face.seed, HEAD_ROWS, WIDTH)
-    pores = noise("pores", face.seed + 1, HEAD_ROWS, WIDTH)
-    head *= (1 + 0.018 * blotches + 0.012 * pores)[..., None]
-    head[..., 1:] *= (1 - 0.018 * noise("blotches", face.seed + 2, HEAD_ROWS, WIDTH))[..., None]
+    light = 1 + 0.018 * noise("blotches", face.seed, HEAD_ROWS, WIDTH)
+    light += 0.012 * noise("pores", face.seed + 1, HEAD_ROWS, WIDTH)
+    pale = light * (1 - 0.018 * noise("blotches", face.seed + 2, HEAD_ROWS, WIDTH))
+    for plane, factor in zip(head, (light, pale, pale), strict=True):
+        plane *= factor
     strength = face.complexion.freckles
     if strength > 0:
-        spots = ramp(noise("spots", face.seed + 3, HEAD_ROWS, WIDTH), 1.5, 2.6)
-        tint(head, (0.66, 0.52, 0.42), 0.8 * strength * spots)
+        spots = ramp(noise("spots", face.seed + 3, HEAD_ROWS, WIDTH), 1.6, 2.8)
+        tint(head, (0.66, 0.52, 0.42), 0.5 * strength * spots)
 
 
 def _paint_hair(head: Image, face: Face, atlas: SkinAtlas) -> None:
@@ -240,7 +168,7 @@ def _paint_hair(head: Image, face: Face, atlas: SkinAtlas) -> None:
         short = np.clip(face.beard_length / 3, 0, 1)
         rows = slice(*np.searchsorted(-atlas.z, (-1.712, -1.585)))
         grain = np.clip(0.75 + 0.25 * noise("fine", face.seed + 5, HEAD_ROWS, WIDTH)[rows], 0, 1.2)
-        lay(head[rows], 0.8 * colour, (0.30 + 0.55 * short) * cover[rows] * grain)
+        lay(head[:, rows], 0.8 * colour, (0.30 + 0.55 * short) * cover[rows] * grain)
     if face.scalp > 0:
         rows = slice(0, int(np.searchsorted(-atlas.z, -1.62)))
         inside = atlas.z[rows, None] - hairline_height(atlas.angle, face.hairline)[None]
@@ -249,13 +177,9 @@ def _paint_hair(head: Image, face: Face, atlas: SkinAtlas) -> None:
         if face.hairline.crown > 0:
             cover = cover * (1 - face.hairline.crown * bald_crown(atlas.place[rows]))
         grain = np.clip(0.85 + 0.2 * noise("fine", face.seed + 7, HEAD_ROWS, WIDTH)[rows], 0, 1.1)
-        lay(head[rows], colour, face.scalp * cover * grain)
-
-
-def bald_crown(place: Float32[np.ndarray, "... 3"]) -> Float32[np.ndarray, "..."]:
-    """How much a place (template) belongs to the part of the scalp that goes bald, 0 .. 1."""
-    aside = np.hypot(place[..., 0] / 0.062, (place[..., 1] + 0.055) / 0.085)
-    return (1 - ramp(aside, 0.75, 1.1)) * (place[..., 2] > 1.76)
+        # stubble darkens the skin; hair lighter than the skin hardly shows
+        shows = np.clip(1.25 - colour.mean() / head[:, :8].mean(), 0.2, 1)
+        lay(head[:, rows], colour, shows * face.scalp * cover * grain)
 
 
 def _paint_brows(head: Image, face: Face, atlas: SkinAtlas) -> None:
@@ -271,66 +195,23 @@ def _paint_brows(head: Image, face: Face, atlas: SkinAtlas) -> None:
     colour = to_linear(greyed(face.hair_colour, 0.6 * face.grey)) * np.float32(0.6)
     for side, columns in ((1, whole), (-1, slice(WIDTH - whole.stop, WIDTH - whole.start))):
         hairs = 0.0003 * noise("pores", face.seed + 11 + side, HEAD_ROWS, WIDTH)[rows, whole]
-        cover = ramp(depth + hairs, -0.0012, 0.0012) * ramp(t, -0.08, 0.14)
+        cover = ramp(depth + hairs, -0.0012, 0.0012) * ramp(t, -0.08, 0.24)
         cover = brows.strength * cover * (1 - ramp(t, 0.92, 1.08))
-        lay(head[rows, columns], colour, cover[:, ::side])
+        lay(head[:, rows, columns], colour, cover[:, ::side])
 
 
-def beard_cover(beard: str, atlas: SkinAtlas) -> Grid:
-    """Where a beard of a kind grows on the unrolled head, 0 .. 1."""
-    return _beard_covers(atlas)[beard]
-
-
-_covers: dict[int, dict[str, Grid]] = {}
-
-
-def _beard_covers(atlas: SkinAtlas) -> dict[str, Grid]:
-    if id(atlas) not in _covers:
-        _covers[id(atlas)] = {
-            kind: beard_field(kind, atlas.place, atlas.angle[None]) for kind in _GROWTH
-        }
-    return _covers[id(atlas)]
-
-
-_GROWTH = {
-    "stubble": ("moustache", "chin", "jaw"),
-    "moustache": ("moustache",),
-    "goatee": ("moustache", "chin"),
-    "full": ("moustache", "chin", "jaw"),
-}
-
-
-def beard_field(
-    beard: str, place: Float32[np.ndarray, "... 3"], angle: Float32[np.ndarray, "..."]
-) -> Float32[np.ndarray, "..."]:
-    """How densely a beard grows at places on the template, 0 .. 1."""
-    x, z = np.abs(place[..., 0]), place[..., 2]
-    degrees = np.abs(np.degrees(angle))
-    mouth = np.hypot(x / 0.027, (z - MOUTH_Z + 0.0005) / 0.0125)
-    around = ramp(mouth, 0.95, 1.15)
-    parts = []
-    if "moustache" in _GROWTH[beard]:
-        top = 1.6735 - 0.35 * np.maximum(x - 0.014, 0)
-        parts.append(ramp(top - z, 0, 0.005) * ramp(z, 1.643, 1.650) * ramp(0.034 - x, 0, 0.006))
-    if "chin" in _GROWTH[beard]:
-        parts.append(ramp(1.645 - z, 0, 0.004) * ramp(0.034 - x, 0, 0.008) * ramp(z, 1.585, 1.60))
-    if "jaw" in _GROWTH[beard]:
-        line = np.interp(degrees, (0, 20, 40, 60, 70, 76, 90), (1.64, 1.645, 1.652, 1.672, 1.70, 1.72, 1.72))
-        neck = np.interp(degrees, (0, 60, 80), (1.592, 1.600, 1.640))
-        side = ramp(line - z, 0, 0.010) * ramp(z - neck, -0.006, 0.008)
-        parts.append(side * (1 - ramp(degrees, 76, 80)))
-    cover = np.max(parts, 0) * around
-    return cover.astype(np.float32)
-
-
-def _strip(face: Face, skin: Float32[np.ndarray, "3"]) -> Image:
+def _strip(face: Face, skin: Float32[np.ndarray, " 3"]) -> Float32[np.ndarray, "rows columns 3"]:
     """All other skin: row by row from pale through the skin's own colour to ruddy."""
     dark = face.complexion.tone
     pale = skin + (1 - skin) * np.array([0.22, 0.17, 0.14], np.float32) * np.float32(0.3 + dark)
     ruddy = skin * np.array([0.95, 0.82, 0.80], np.float32)
     kind = np.clip((np.arange(STRIP_ROWS) - 2) / (STRIP_ROWS - 6), 0, 1)
     rows = np.stack(
-        [np.interp(kind, (0, 0.45, 0.55, 1), (a, b, b, c)) for a, b, c in zip(pale, skin, ruddy)], 1
+        [
+            np.interp(kind, (0, 0.45, 0.55, 1), (a, b, b, c))
+            for a, b, c in zip(pale, skin, ruddy, strict=True)
+        ],
+        1,
     )
     image = np.repeat(rows[:, None], WIDTH, 1).astype(np.float32)
     image *= 1 + 0.02 * noise("blotches", face.seed + 8, STRIP_ROWS, WIDTH)[..., None]
@@ -343,8 +224,8 @@ def paint_eyes(face: Face) -> Float32[np.ndarray, "rows columns 4"]:
     at = (np.arange(EYE_PX, dtype=np.float32) + 0.5) / EYE_PX * EYE_SPAN - EYE_SPAN / 2
     x, z = np.meshgrid(at, -at)
     r = np.hypot(x, z)
-    image = np.empty((EYE_PX, EYE_PX, 3), np.float32)
-    image[:] = (0.62, 0.57, 0.54)
+    image = np.empty((3, EYE_PX, EYE_PX), np.float32)
+    image[:] = np.array((0.62, 0.57, 0.54))[:, None, None]
     tint(image, (0.85, 0.55, 0.50), 0.5 * ramp(np.abs(x), 0.006, 0.013))
     iris = to_linear(face.iris)
     lay(image, iris * np.float32(0.35), 1 - ramp(r, 0.0056, 0.0070))
@@ -355,5 +236,5 @@ def paint_eyes(face: Face) -> Float32[np.ndarray, "rows columns 4"]:
     tint(image, (0.30, 0.26, 0.26), 0.9 * ramp(z, -0.0005, 0.0050))
     glint = np.hypot(x + 0.0018, z - 0.0012)
     lay(image, np.full(3, 0.85, np.float32), 0.8 * (1 - ramp(glint, 0.0004, 0.0013)))
-    tile = np.concatenate([image, np.zeros((EYE_PX, EYE_PX, 1), np.float32)], 2)
+    tile = np.concatenate([image.transpose(1, 2, 0), np.zeros((EYE_PX, EYE_PX, 1), np.float32)], 2)
     return np.concatenate([tile, tile], 1)

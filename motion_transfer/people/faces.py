@@ -21,7 +21,7 @@ GLASSES = ("none", "round", "square", "wide", "sun")
 
 # hair colours: sRGB of a lit lock, how common among (african, asian, caucasian) body types
 HAIR_COLOURS: dict[str, tuple[Colour, tuple[float, float, float]]] = {
-    "black": ((0.105, 0.090, 0.085), (0.70, 0.62, 0.10)),
+    "black": ((0.145, 0.125, 0.118), (0.70, 0.62, 0.10)),
     "dark_brown": ((0.190, 0.135, 0.105), (0.24, 0.28, 0.26)),
     "brown": ((0.305, 0.210, 0.145), (0.04, 0.07, 0.24)),
     "light_brown": ((0.440, 0.320, 0.220), (0.01, 0.02, 0.15)),

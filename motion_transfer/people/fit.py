@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float32
 
 from motion_transfer.people.body import Body, Points
 from motion_transfer.people.flattening import vertex_normals
@@ -28,13 +27,15 @@ class Fall:
     Attributes:
         ease: from the skin, metres.
         radii: least radius at evenly spread levels from the tube's top to its end, metres; a few
-            numbers, interpolated; 0 where the body decides.
+            numbers, interpolated; 0 where the body decides; on a body of the template's height.
         drop: by how much the radius may shrink for each metre further down; 0 hangs straight.
+        under: the room is below the limb, not all around it.
     """
 
     ease: float
     radii: tuple[float, ...] = (0.0,)
     drop: float = 10.0
+    under: bool = False
 
 
 class Fitting:
@@ -43,14 +44,12 @@ class Fitting:
     Attributes:
         surface: fields over the skin.
         body: who is dressed.
-        normals: of the skin at rest, V x 3.
+        scale: of the body's height to the template's.
     """
 
     def __init__(self, surface: BodySurface, body: Body) -> None:
         self.surface, self.body = surface, body
-        self.normals: Float32[np.ndarray, "V 3"] = vertex_normals(
-            body.points, surface.model.faces, surface.sums
-        )
+        self.scale = body.height / surface.model.template.height
 
     @cached_property
     def trunk(self) -> tuple[Table, np.ndarray, float]:
@@ -78,6 +77,7 @@ class Fitting:
         limbs: Fall | None = None,
         folds: float = 0.0,
         seed: int = 0,
+        hang: np.ndarray | float = 1.0,
     ) -> Points:
         """Where a pattern's cloth lies at rest.
 
@@ -87,32 +87,37 @@ class Fitting:
             limbs: how sleeves (of a top) or legs (of trousers) hang.
             folds: height of slow waves of the cloth, metres.
             seed: of the folds.
+            hang: V or a number, 0..1: where the trunk's cloth hangs (0: is held to the body).
         """
-        skin, outward = self.body.points[pattern.index], self.normals[pattern.index]
+        skin = self.body.points[pattern.index]
+        outward = vertex_normals(skin, pattern.faces, pattern.sums)
         points = skin
         for _ in range(_ROUNDS):
             points = pattern.smoother @ points
-        points = points + vertex_normals(points, pattern.faces, pattern.sums) * ease[:, None]
+        normals = vertex_normals(points, pattern.faces, pattern.sums)
+        points = points + normals * ease[:, None]
         if trunk is not None:
-            points = self._hang_trunk(pattern, points, trunk)
+            points = self._hang_trunk(pattern, points, trunk, hang)
         if limbs is not None:
             for name in ("arm.L", "arm.R") if pattern.kind == "top" else ("leg.L", "leg.R"):
                 points = self._hang_limb(pattern, points, name, limbs)
         if folds > 0:
-            normals = vertex_normals(points, pattern.faces, pattern.sums)
-            points = points + normals * (folds * _waves(pattern.home, seed))[:, None]
+            height = folds * (1 + _waves(pattern.home, seed)) * pattern.loose * hang
+            points = points + normals * height[:, None]
         # never nearer to the skin than half the ease
         clearance = np.einsum("vi,vi->v", points - skin, outward)
-        short = np.maximum(np.minimum(ease, 0.5 * ease + 0.002) - clearance, 0)
+        short = np.maximum(np.minimum(ease, 0.8 * ease + 0.0015) - clearance, 0)
         short = pattern.smoother @ short + np.float32(0.5) * short
         return (points + outward * short[:, None]).astype(np.float32)
 
-    def _hang_trunk(self, pattern: Pattern, points: Points, fall: Fall) -> Points:
+    def _hang_trunk(
+        self, pattern: Pattern, points: Points, fall: Fall, hang: np.ndarray | float
+    ) -> Points:
         radii, _, axis = self.trunk
         tube = self.surface.torso_tube
-        hung = _fallen(tube, radii, fall)
+        hung = _fallen(tube, radii, fall, self.scale)
         wanted = pattern.readers["trunk"] @ hung.ravel()
-        share = pattern.shares["trunk"]
+        share = pattern.shares["trunk"] * hang
         away = points[:, :2] - np.array([0, axis], np.float32)
         radius = np.sqrt((away**2).sum(1)) + 1e-6
         scale = 1 + share * (_at_least(radius, wanted) / radius - 1)
@@ -123,7 +128,7 @@ class Fitting:
 
     def _hang_limb(self, pattern: Pattern, points: Points, name: str, fall: Fall) -> Points:
         joints, radii = self.limb(name)
-        hung = _fallen(self.surface.limb_tubes[name], radii, fall)
+        hung = _fallen(self.surface.limb_tubes[name], radii, fall, self.scale)
         own = pattern.limbs[name]
         wanted = pattern.readers[name] @ hung.ravel()
         _, axis = along_polyline(points[own], joints)
@@ -140,12 +145,19 @@ class Fitting:
         return out
 
 
-def _fallen(tube: Tube, radii: Table, fall: Fall) -> Table:
+def _fallen(tube: Tube, radii: Table, fall: Fall, scale: float) -> Table:
     at = np.linspace(0, 1, len(radii))
-    least = np.interp(at, np.linspace(0, 1, len(fall.radii)), fall.radii)
-    eased = np.maximum(radii + fall.ease, least[:, None]).astype(np.float32)
-    steps = np.diff(tube.levels)
-    return hanging(bridged(eased, 1), (fall.drop * steps).astype(np.float32))
+    least = np.interp(at, np.linspace(0, 1, len(fall.radii)), fall.radii) * scale
+    eased = (radii + fall.ease).astype(np.float32)
+    steps = np.diff(tube.levels) * scale
+    hung = hanging(
+        np.maximum(bridged(eased, 1), least[:, None]), (fall.drop * steps).astype(np.float32)
+    )
+    if not fall.under:
+        return hung
+    # sleeves rest on the arm: their room is below it
+    below = 1 - 0.8 * np.sin(tube.angles)
+    return eased + (hung - eased) * below
 
 
 def _at_least(radius: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -109,7 +109,10 @@ def unfold(points: Points, faces: Faces, down: np.ndarray, is_cut: IsCut) -> Cha
     gradient = csr_array(
         (
             np.concatenate([hat.ravel() for hat in hats]),
-            (np.tile(rows.ravel(), 3), np.concatenate([np.repeat(wedge[:, k], 3) for k in range(3)])),
+            (
+                np.tile(rows.ravel(), 3),
+                np.concatenate([np.repeat(wedge[:, k], 3) for k in range(3)]),
+            ),
         ),
         (rows.size, wedge.max() + 1),
     )
@@ -164,10 +167,11 @@ def flat_map(
     out[seen] = np.einsum("nk,nkc->nc", share, values[faces[ids[seen]]])
     mask = (ids >= 0).reshape(height, width).astype(np.uint8)
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5) / texels_per_metre
-    _, nearest = cv2.distanceTransformWithLabels(
+    _, labels = cv2.distanceTransformWithLabels(
         1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
+    nearest = np.asarray(labels, np.int64).ravel()
     lookup = np.zeros(int(nearest.max()) + 1, np.int64)
-    lookup[nearest.ravel()[seen]] = seen
-    filled = out[lookup[nearest.ravel()]]
+    lookup[nearest[seen]] = seen
+    filled = out[lookup[nearest]]
     return filled.reshape(height, width, -1), depth.astype(np.float32)

@@ -1,15 +1,17 @@
 """Hair as pieces, off the head and with volume.
 
-    sample_hair -> Hair -> hair_pieces -> pieces
+sample_hair -> Hair -> hair_pieces -> pieces
 """
 
 from __future__ import annotations
 
 from motion_transfer.people.body import Body, BodyModel
-from motion_transfer.people.hair_cap import cap_piece
+from motion_transfer.people.hair_cap import cap_piece, under_piece
 from motion_transfer.people.hair_grid import Head
 from motion_transfer.people.hair_hang import hang_piece
 from motion_transfer.people.hair_styles import HATS, STYLES, Hair, sample_hair
+from motion_transfer.people.hair_tail import bun_piece, tail_piece
+from motion_transfer.people.hats import hat_pieces
 from motion_transfer.people.mesh import Piece, PosedBody
 
 __all__ = ["HATS", "STYLES", "Hair", "hair_pieces", "sample_hair"]
@@ -27,6 +29,17 @@ def hair_pieces(hair: Hair, body: Body, model: BodyModel) -> list[Piece]:
     still = body.transforms({})
     rest = PosedBody(body, still, body.points, body.heads)
     limit = None if hair.hat == "none" else 0.006
+    pieces = hat_pieces(hair, head)
+    if hair.style == "bald":
+        return pieces
     if hair.style in _HANGING:
-        return [hang_piece(hair, head, rest, limit)]
-    return [cap_piece(hair, head, limit)]
+        pieces.append(hang_piece(hair, head, rest, limit))
+        if hair.fringe == 0:
+            pieces.append(under_piece(hair, head))
+        return pieces
+    pieces.append(cap_piece(hair, head, limit))
+    if hair.style in ("ponytail", "braid"):
+        pieces.append(tail_piece(hair, head, rest))
+    if hair.style == "bun":
+        pieces.append(bun_piece(hair, head))
+    return pieces

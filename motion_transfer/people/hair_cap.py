@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from motion_transfer.people.face_paint import ramp
+from motion_transfer.people.brushes import ramp, to_linear
 from motion_transfer.people.hair_grid import (
     Grid,
     Grid3,
@@ -20,8 +22,9 @@ from motion_transfer.people.mesh import Material, Piece
 from motion_transfer.people.skin_atlas import head_angle
 
 _COLUMNS, _ROWS = 72, 28
+_TIED = ("ponytail", "bun", "braid")
 # how far hair on the sides stands off compared with the top's
-_SIDES = {"buzz": 0.9, "short": 0.42, "side_part": 0.40, "quiff": 0.30, "pixie": 0.6, "bald": 0.8}
+_SIDES = {"buzz": 0.9, "short": 0.42, "side_part": 0.40, "quiff": 0.30, "pixie": 0.6}
 
 
 def cap_piece(hair: Hair, head: Head, limit: float | None = None) -> Piece:
@@ -43,11 +46,11 @@ def cap_piece(hair: Hair, head: Head, limit: float | None = None) -> Piece:
         off = np.minimum(off, limit)
     normals = _combed(hair, normals, place, inside, points - head.map.middle)
     surface = points + off[..., None] * normals
-    ragged = 0.0022 * rng.standard_normal((_ROWS, _COLUMNS))
-    ragged = ragged + 0.003 * lumps(rng, _ROWS, _COLUMNS, 1.2)
-    keep = inside + ragged * (1.5 if hair.style == "pixie" else 1.0)
+    ragged = 0.0016 * rng.standard_normal((_ROWS, _COLUMNS))
+    ragged = ragged + 0.0024 * lumps(rng, _ROWS, _COLUMNS, 1.2)
+    keep = inside + ragged * {"pixie": 1.5, **dict.fromkeys(_TIED, 0.6)}.get(hair.style, 1.0)
     faces, uv = grid_faces(_ROWS, _COLUMNS, closed=True)
-    if hair.style in ("ponytail", "bun", "braid"):
+    if hair.style in _TIED:
         uv = _uv_to_tie(plane.reshape(-1, 2)[faces], tie_place(hair))
     return Piece(
         name="hair",
@@ -57,13 +60,23 @@ def cap_piece(hair: Hair, head: Head, limit: float | None = None) -> Piece:
         corner_uv=uv,
         material=hair_material(hair, (0.6, 0.2)),
         keep=keep.ravel().astype(np.float32),
+        two_sided=True,  # one looks under the edge of what stands off
     )
+
+
+def under_piece(hair: Hair, head: Head) -> Piece:
+    """A thin layer that covers the scalp up to the hairline, under hair that is parted."""
+    thin = replace(
+        hair, style="side_part" if hair.part else "short", volume=0.004, curl=0.0, roots=hair.colour
+    )
+    return replace(cap_piece(thin, head), name="hair_under")
 
 
 def hair_material(hair: Hair, size: tuple[float, float]) -> Material:
     """What this hair looks like."""
-    short = hair.style in ("buzz", "bald")
+    short = hair.style == "buzz"
     tufts = 1.0 if hair.style == "afro" else max(hair.curl * 0.8, 0.8 * short)
+    light = float(to_linear(hair.colour).mean())
     return Material(
         paint_hair(
             hair.colour,
@@ -76,8 +89,8 @@ def hair_material(hair: Hair, size: tuple[float, float]) -> Material:
             seed=hair.seed,
         ),
         size,
-        gloss=0.05 if tufts > 0.7 else 0.40 * (1 - 0.7 * hair.curl),
-        sharpness=24.0,
+        gloss=0.02 if tufts > 0.7 else (0.035 + 0.10 * light) * (1 - 0.6 * hair.curl),
+        sharpness=36.0,
         translucency=0.15,
         sheen_along_v=tufts <= 0.7,
     )
@@ -102,9 +115,11 @@ def _standing(
     top = ramp(place[..., 2], 1.735, 1.800)
     sides = _SIDES.get(hair.style, 1.0)
     off = hair.volume * (sides + (1 - sides) * top)
-    width = 0.012 if hair.style in ("buzz", "bald") else 0.030
+    width = 0.012 if hair.style == "buzz" else 0.030
     if hair.style == "afro":
         width = 0.5 * hair.volume + 0.010
+    if hair.hairline.crown > 0.2:  # thin hair lies flat
+        off = np.minimum(off, 0.009)
     off = off * np.sqrt(ramp(inside, -0.006, width))
     angle = head_angle(place)
     if hair.style == "side_part":
@@ -114,8 +129,9 @@ def _standing(
     if hair.style == "quiff":
         front = np.exp(-((angle / 0.9) ** 2)) * np.exp(-(((inside - 0.02) / 0.035) ** 2))
         off = off + 0.9 * hair.volume * front
-    rough = 0.10 + 0.16 * hair.curl
-    grain = lumps(rng, *off.shape, 0.7 + 0.5 * hair.curl) + 0.8 * lumps(rng, *off.shape, 2.2)
+    rough = 0.04 if hair.style in _TIED else 0.10 + 0.16 * hair.curl
+    grain = lumps(rng, _ROWS, _COLUMNS, 0.7 + 0.5 * hair.curl)
+    grain = grain + 0.8 * lumps(rng, _ROWS, _COLUMNS, 2.2)
     off = off * np.clip(1 + rough * grain, 0.4, 1.8)
     return (off + 0.0012).astype(np.float32)
 

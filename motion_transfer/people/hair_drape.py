@@ -11,7 +11,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float32
-from scipy.spatial import cKDTree
+
+# the stubs leave it out; its subclass KDTree takes twice as long a query
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.people.body import Body, BodyModel, Faces, Points, SkinWeights
 from motion_transfer.people.mesh import PosedBody
@@ -53,13 +55,15 @@ def obstacle(model: BodyModel) -> Obstacle:
     bones = np.flatnonzero([name.startswith(starts) for name in names])
     share = np.asarray(model.weights.matrix[:, bones].sum(1)).ravel()
     ear = (np.abs(points[:, 0]) > 0.078) & (points[:, 2] > 1.66)
-    wanted = np.flatnonzero(part & (share > 0.6) & (points[:, 2] < 1.80) & ~ear)
+    wanted = np.flatnonzero(
+        part & (share > 0.6) & (points[:, 2] < 1.80) & (points[:, 2] > 1.0) & ~ear
+    )
     normals = vertex_normals(points, model.faces)
     middle = points[wanted] - [0, -0.05, 0]
     outward = (normals[wanted] * middle)[:, :2].sum(1) + 0.05 * normals[wanted, 2] > -0.02
     wanted = wanted[outward]
     # one vertex a cell: the face is much finer than hair needs
-    cell = np.where(points[wanted, 2:] > 1.60, 0.014, 0.020)
+    cell = np.where(points[wanted, 2:] > 1.60, 0.020, 0.032)
     _, first = np.unique(np.floor(points[wanted] / cell).astype(int), axis=0, return_index=True)
     index = np.sort(wanted[first])
     around = model.faces[np.isin(model.faces, index).any(1)]
@@ -79,6 +83,10 @@ class Fall:
         steps: points of a strand after its root.
         clear: metres between skin and hair, one for each strand.
         front: one for each strand: -1 falls behind the shoulder, 1 in front of it.
+        cohesion: strands x strands, rows sum to 1: where each strand would be in the middle of its
+            neighbours.
+        aside: metres to the torso's left of the neck at which strands in front of the shoulder come
+            to lie; not used for the others.
         stiffness: how much of its direction a strand keeps a step, 0 .. 1.
         inward: how much the ends turn in (a bob) or, if negative, flip out.
     """
@@ -87,6 +95,8 @@ class Fall:
     steps: int
     clear: Float32[np.ndarray, " strands"]
     front: Float32[np.ndarray, " strands"]
+    cohesion: Float32[np.ndarray, "strands strands"]
+    aside: Float32[np.ndarray, " strands"]
     stiffness: float = 0.55
     inward: float = 0.0
 
@@ -113,11 +123,11 @@ def drape(
     """
     points = posed.points[skin.index]
     turned = (skin.weights.matrix @ posed.transforms[:, :, :3].reshape(-1, 9)).reshape(-1, 3, 3)
-    outward = np.einsum("vij,vj->vi", turned, normals)
+    outward = (turned @ normals[:, :, None])[..., 0]
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-6)
-    tree = cKDTree(points)
+    tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
     torso = posed.transforms[skin.torso]
-    forward = -torso[:, 1]  # the person faces -y at rest
+    forward, left = -torso[:, 1], torso[:, 0]  # the person faces -y at rest
     neck = posed.joints[skin.neck].astype(np.float32)
     clear = fall.clear
     down = np.array([0, 0, -1], np.float32)
@@ -127,15 +137,26 @@ def drape(
     for k in range(fall.steps):
         ahead = (at - neck) @ forward
         # on the shoulder hair slides to the side it is on, or to the one it prefers
-        side = np.tanh(ahead / 0.05 + 1.2 * fall.front)
-        pull = down + (0.06 * fall.front + 0.9 * touched * side)[:, None] * forward
+        side = np.tanh(ahead / 0.10 + 2.0 * fall.front)
+        pull = down + (0.15 * fall.front + 0.9 * touched * side)[:, None] * forward
+        # and does not spread over the arms
+        aside = (at - neck) @ left
+        pull = (
+            pull
+            - (touched * (aside - np.clip(aside, -0.12, 0.12)) / 0.03).clip(-1, 1)[:, None] * left
+        )
+        below = np.clip((neck[2] - at[:, 2]) / 0.10, 0, 1) * (fall.front > 0)
+        pull = pull + (below * ((fall.aside - aside) / 0.06).clip(-0.7, 0.7))[:, None] * left
         late = fall.inward * max(0.0, (k + 1) / fall.steps - 0.5)
         if late:
             home = (neck - at) * np.array([1, 1, 0], np.float32)
-            pull = pull + late * home / np.maximum(np.linalg.norm(home, axis=1, keepdims=True), 1e-6)
+            pull = pull + late * home / np.maximum(
+                np.linalg.norm(home, axis=1, keepdims=True), 1e-6
+            )
         way = fall.stiffness * way + (1 - fall.stiffness) * pull
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
         new = at + fall.step[:, None] * way
+        new = new + 0.6 * (fall.cohesion @ new - new)
         _, near = tree.query(new)
         normal = outward[near]
         depth = clear - ((new - points[near]) * normal).sum(1)

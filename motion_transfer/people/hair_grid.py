@@ -6,6 +6,7 @@ Convention: a grid's points come row by row (rows x columns), from the roots to 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -13,8 +14,9 @@ from jaxtyping import Float32
 from scipy.sparse import csr_array
 
 from motion_transfer.people.body import Body, BodyModel, Faces, SkinWeights
-from motion_transfer.people.face_paint import bald_crown, hairline_height, ramp
+from motion_transfer.people.brushes import ramp
 from motion_transfer.people.faces import Hairline
+from motion_transfer.people.growth import bald_crown, hairline_height
 from motion_transfer.people.head_map import HeadMap, head_map
 from motion_transfer.people.skin_atlas import head_angle
 
@@ -81,11 +83,13 @@ def until(
     return -along + np.sqrt(np.maximum(along**2 - (roots**2).sum(1) + radius**2, 0))
 
 
+@cache
 def grid_faces(rows: int, columns: int, closed: bool) -> tuple[Faces, Float32[np.ndarray, "F 3 2"]]:
     """Triangles of a grid and their corners' texture coordinates: u by column, v by row.
 
     Args:
         closed: the last column is joined to the first.
+    Returns: arrays that all grids of this size share; not to be written to.
     """
     across = columns if closed else columns - 1
     row, column = np.divmod(np.arange((rows - 1) * across), across)

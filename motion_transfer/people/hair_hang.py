@@ -10,7 +10,7 @@ from jaxtyping import Float32
 from scipy.interpolate import make_interp_spline
 
 from motion_transfer.people.body import Points
-from motion_transfer.people.face_paint import ramp
+from motion_transfer.people.brushes import ramp
 from motion_transfer.people.hair_cap import hair_material
 from motion_transfer.people.hair_drape import Fall, Obstacle, drape, obstacle, rest_normals
 from motion_transfer.people.hair_grid import Head, grid_faces, ray_roots, rays, until
@@ -18,8 +18,9 @@ from motion_transfer.people.hair_styles import Hair
 from motion_transfer.people.mesh import Piece, PosedBody
 
 _COLUMNS, _HUG, _HANG = 72, 14, 28
-_GUIDES, _STEPS = 36, 12  # what is marched; the rest lies between
+_GUIDES, _STEPS = 36, 10  # what is marched; the rest lies between
 Parting = tuple[tuple[float, float], tuple[float, float]]
+_PARTED = 0.05  # metres between neighbouring guides
 _RELEASE = 1.60  # radians from straight up at which hair leaves the head
 
 
@@ -37,7 +38,7 @@ class Curtain:
     Attributes:
         fall: how the guides hang.
         guides: columns that are marched.
-        between: COLUMNS x GUIDES: each column from its guides.
+        between: for each column the guides on either side, and its share of the second.
         swing: HANG x COLUMNS x 2 metres by which waves move each point sideways and outward.
         breaks: columns at which a new lock begins.
         skin, normals: what the hair keeps clear of.
@@ -45,7 +46,7 @@ class Curtain:
 
     fall: Fall
     guides: np.ndarray
-    between: Float32[np.ndarray, "columns guides"]
+    between: tuple[np.ndarray, np.ndarray, Float32[np.ndarray, " columns"]]
     swing: Float32[np.ndarray, "rows columns 2"]
     breaks: tuple[int, ...]
     skin: Obstacle
@@ -58,8 +59,12 @@ class Curtain:
         roots = last[self.guides]
         strands = drape(roots, way[self.guides], self.fall, self.skin, self.normals, posed)
         strands = np.concatenate([roots[None], strands])
+        first, second, share = self.between
+        gap = strands[:, second] - strands[:, first]
+        # guides that part around a shoulder take the columns between them to either side
+        parted = (gap**2).sum(-1) > _PARTED**2
+        strands = strands[:, first] + np.where(parted, share.round(), share)[..., None] * gap
         # the columns' own roots are kept: only what lies below them comes from the guides
-        strands = np.einsum("cg,sgx->scx", self.between, strands)
         strands[0] = last
         rows = (_refine() @ strands.reshape(_STEPS + 1, -1)).reshape(_HANG, _COLUMNS, 3)
         along = _unit(np.gradient(last, axis=0))
@@ -93,12 +98,12 @@ def hang_piece(hair: Hair, head: Head, rest: PosedBody, limit: float | None = No
     off = _standing(hair, lengths, fringe, rng)
     hug = points + np.minimum(off, limit or 1.0)[..., None] * normals
     azimuth = np.abs(np.arctan2(*(roots + ways * release[:, None]).T * np.array([[1], [-1]])))
-    front = np.degrees(azimuth) < (55 + 55 * hair.front if hair.front > 0 else 0)
+    front = _in_front(hair, azimuth)
     curtain, length = _curtain(hair, head, fringe, front, rng)
     surface = np.concatenate([hug, np.repeat(hug[-1:], _HANG, 0)]).reshape(-1, 3)
     surface = curtain(np.ascontiguousarray(surface, np.float32), rest)
     faces, uv = grid_faces(_HUG + _HANG, _COLUMNS, closed=hair.fringe > 0)
-    faces, uv = _cut_locks(faces, uv, curtain.breaks, hair.length)
+    faces, uv = _cut_locks(faces, uv, curtain.breaks, surface)
     return Piece(
         name="hair",
         points=surface,
@@ -110,6 +115,16 @@ def hang_piece(hair: Hair, head: Head, rest: PosedBody, limit: float | None = No
         two_sided=True,
         settle=curtain,
     )
+
+
+def _in_front(hair: Hair, azimuth: Float32[np.ndarray, " columns"]) -> np.ndarray:
+    """Which columns fall in front of the shoulders."""
+    if hair.front == 0:
+        return np.zeros(_COLUMNS, bool)
+    if hair.fringe > 0:
+        return np.degrees(azimuth) < 85 + 20 * hair.front
+    edge = np.minimum(np.arange(_COLUMNS), np.arange(_COLUMNS)[::-1])
+    return edge < 6 + 8 * hair.front
 
 
 def _layout(
@@ -167,14 +182,16 @@ def _curtain(
         steps=_STEPS,
         clear=np.where(fringe > 0.5, 0.006, 0.45 * hair.volume + 0.006)[guides].astype(np.float32),
         front=side[guides],
+        cohesion=_cohesion(side[guides], 1 - fringe[guides]),
+        aside=_aside(side, fringe)[guides],
         stiffness=0.4,
         inward=1.2 * float(rng.uniform(-0.2, 1)) if hair.style == "bob" else 0.0,
     )
     down = np.linspace(0, 1, _HANG + 1)[1:, None] * length
-    phase = np.cumsum(rng.normal(0, 0.5, _COLUMNS))
+    phase = np.cumsum(rng.normal(0, 0.7, _COLUMNS))
     wave = hair.wave * ramp(down, 0.0, 0.10)
-    turn = 2 * np.pi * down / (0.11 - 0.04 * hair.curl) + phase
-    swing = np.stack([0.8 * wave * np.sin(turn), wave * (1 + np.cos(turn))], -1)
+    turn = 2 * np.pi * down / (0.13 - 0.05 * hair.curl) + phase
+    swing = np.stack([0.7 * wave * np.sin(turn), 0.7 * wave * (1 + np.cos(turn))], -1)
     skin = obstacle(head.model)
     return Curtain(
         fall=fall,
@@ -187,29 +204,76 @@ def _curtain(
     ), length
 
 
-def _between(guides: np.ndarray, breaks: np.ndarray) -> Float32[np.ndarray, "columns guides"]:
-    """Each column as a mixture of the guides of its own lock."""
-    columns = np.arange(_COLUMNS)
-    lock = np.searchsorted(breaks, columns, side="right")
-    out = np.zeros((_COLUMNS, len(guides)), np.float32)
-    for k in np.unique(lock):
-        own = np.flatnonzero(lock[guides] == k)
-        mine = lock == k
-        hats = [np.interp(columns[mine], guides[own], row) for row in np.eye(len(own))]
-        out[np.ix_(mine, own)] = np.array(hats).T
+def _aside(
+    side: Float32[np.ndarray, " columns"], fringe: Float32[np.ndarray, " columns"]
+) -> Float32[np.ndarray, " columns"]:
+    """Where columns in front of the shoulders come to lie: spread over either side of the chest."""
+    out = np.zeros(_COLUMNS, np.float32)
+    loose = (side > 0) & (fringe < 0.5)
+    left = np.arange(_COLUMNS) < _COLUMNS // 2
+    if fringe.any():  # a fringe's columns begin behind: the left side comes after the middle
+        left = ~left
+    for own, sign in ((loose & left, 1), (loose & ~left, -1)):
+        rank = np.linspace(0.045, 0.125, int(own.sum()))
+        outermost_last = rank if (sign > 0) else rank[::-1]
+        out[own] = sign * outermost_last
     return out
 
 
+def _cohesion(
+    side: Float32[np.ndarray, " strands"], loose: Float32[np.ndarray, " strands"]
+) -> Float32[np.ndarray, "strands strands"]:
+    """The middle of as many neighbours on the left as on the right, all of the strand's own lock.
+
+    A lock's outermost strands and a fringe's are left alone, so that locks keep their width.
+    """
+    count = len(side)
+    out = np.eye(count, dtype=np.float32)
+    lock = np.cumsum(np.concatenate([[0], np.diff(side) != 0])) + 1000 * (loose < 0.5)
+    for k in range(count):
+        reach = 0
+        while (
+            reach < 3
+            and k - reach - 1 >= 0
+            and k + reach + 1 < count
+            and lock[k - reach - 1] == lock[k] == lock[k + reach + 1]
+        ):
+            reach += 1
+        out[k] = 0
+        out[k, k - reach : k + reach + 1] = 1 / (2 * reach + 1)
+    return out
+
+
+def _between(
+    guides: np.ndarray, breaks: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, Float32[np.ndarray, " columns"]]:
+    """The guides on either side of each column, in its own lock, and its share of the second."""
+    columns = np.arange(_COLUMNS)
+    lock = np.searchsorted(breaks, columns, side="right")
+    first, second = np.zeros(_COLUMNS, int), np.zeros(_COLUMNS, int)
+    for k in np.unique(lock):
+        own = np.flatnonzero(lock[guides] == k)
+        mine = lock == k
+        after = np.searchsorted(guides[own], columns[mine])
+        second[mine] = own[np.clip(after, 0, len(own) - 1)]
+        first[mine] = own[np.clip(after - 1, 0, len(own) - 1)]
+    gap = np.maximum(guides[second] - guides[first], 1)
+    share = np.clip((columns - guides[first]) / gap, 0, 1)
+    return first, second, share.astype(np.float32)
+
+
 def _cut_locks(
-    faces: np.ndarray, uv: np.ndarray, breaks: tuple[int, ...], length: float
+    faces: np.ndarray, uv: np.ndarray, breaks: tuple[int, ...], points: Points
 ) -> tuple[np.ndarray, np.ndarray]:
     """Leave out what would span the gap between hair before and behind the shoulder."""
-    row, column = faces // _COLUMNS, faces % _COLUMNS
-    low = row.max(1) > _HUG + 0.09 * _HANG / max(length, 1e-6)
+    column = faces % _COLUMNS
     across = np.zeros(len(faces), bool)
     for first in breaks:
         across |= (column.min(1) == first - 1) & (column.max(1) == first)
-    kept = ~(low & across)
+    suspects = np.flatnonzero(across)
+    corners = points[faces[suspects]]
+    kept = np.ones(len(faces), bool)
+    kept[suspects[np.ptp(corners, axis=1).max(1) > 0.04]] = False
     return np.ascontiguousarray(faces[kept]), np.ascontiguousarray(uv[kept])
 
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from motion_transfer.people.face_paint import ramp, to_linear
+from motion_transfer.people.brushes import ramp, to_linear
 from motion_transfer.people.faces import GREY, Colour
 
 COLUMNS, ROWS = 256, 96
@@ -25,6 +25,13 @@ def _strands() -> Float32[np.ndarray, "192 2048"]:
         soft = cv2.GaussianBlur(wide, (0, 0), sigmaX=across, sigmaY=along)[192:384, 1024:3072]
         total += amount * soft / soft.std()
     return total / total.std()
+
+
+@cache
+def _single_hairs() -> Float32[np.ndarray, "192 2048"]:
+    """Only the thinnest streaks, deviation 1."""
+    grain = np.random.default_rng(33).standard_normal((1, 2048)).astype(np.float32)
+    return np.repeat(grain, 192, 0)
 
 
 @cache
@@ -66,10 +73,11 @@ def paint_hair(
     v = ((np.arange(ROWS) + 0.5) / ROWS).astype(np.float32)[:, None]
     base = np.broadcast_to(to_linear(colour), (ROWS, COLUMNS, 3)).astype(np.float32)
     if roots is not None:
-        base = base + (1 - ramp(v, 0.05, 0.30))[..., None] * (to_linear(roots) - base)
+        base = base + (1 - ramp(v, 0.02, 0.16))[..., None] * (to_linear(roots) - base)
     if grey > 0:
-        white = np.roll(_strands()[window], 97, 1)
-        base = base + ramp(white, 1.5 - 3 * grey, 2.2 - 3 * grey)[..., None] * (to_linear(GREY) - base)
+        base = base + 0.15 * ramp(_single_hairs()[window], 1.2 - 3 * grey, 2.4 - 3 * grey)[
+            ..., None
+        ] * (to_linear(GREY) - base)
     shade = np.exp(contrast * streaks) * (0.72 + 0.28 * ramp(v, 0.0, 0.22)) * (1 + tips * v)
     texture = np.empty((ROWS, COLUMNS, 4), np.float32)
     texture[..., :3] = np.clip(base * shade[..., None], 0, 0.9)

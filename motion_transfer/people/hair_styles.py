@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from motion_transfer.people.body import Shape
-from motion_transfer.people.faces import Colour, Face, Hairline, greyed, sample_face
+from motion_transfer.people.faces import Colour, Face, Hairline, MakeUp, greyed, sample_face
 
 # style: how common among women and men
 STYLES: dict[str, tuple[float, float]] = {
@@ -102,6 +102,8 @@ def sample_hair(rng: np.random.Generator, shape: Shape, face: Face | None = None
     """Draw hair that goes with a body and, where given, with the colour and hairline of a face."""
     face = face or sample_face(rng, shape)
     female = bool(rng.random() < np.clip((shape.gender - 0.5) * 4 + 0.5, 0, 1))
+    # what the face says comes before the body's build
+    female = (female or face.make_up != MakeUp()) and face.beard == "none"
     african = shape.african / max(shape.african + shape.asian + shape.caucasian, 1e-6)
     style = _sample_style(rng, female, african, face)
     low, high, thin, thick = _SIZES[style]
@@ -117,7 +119,7 @@ def sample_hair(rng: np.random.Generator, shape: Shape, face: Face | None = None
     return Hair(
         style=style,
         colour=colour,
-        roots=natural,
+        roots=natural if rng.random() < 0.4 else colour,
         grey=0.0 if dyed else 0.5 * face.grey * (1 - face.grey),
         length=float(rng.uniform(low, high)),
         volume=float(rng.uniform(thin, thick)) + 0.010 * curly * (high > 0),

@@ -22,7 +22,7 @@ from motion_transfer.people.skin_atlas import components
 MIDDLE = np.array([0.0, -0.045, 1.725], np.float32)  # of the template's head
 REACH = 2.65  # radians from straight up to the map's edge
 SIZE = 97
-PlanePoints = Float32[np.ndarray, "... 2"]
+PlanePoints = Float32[np.ndarray, "*places 2"]
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class HeadMap:
     """
 
     layers: Float32[np.ndarray, "rows columns 9"]
-    middle: Float32[np.ndarray, "3"]
+    middle: Float32[np.ndarray, " 3"]
 
     def at(self, plane: PlanePoints) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points, outward normals and template points at places of the map (radians)."""
@@ -45,7 +45,11 @@ class HeadMap:
         args = (flat[..., 0], flat[..., 1], cv2.INTER_LINEAR)
         # cv2 takes at most four channels at a time
         looked_up = [
-            cv2.remap(np.ascontiguousarray(self.layers[..., k : k + 3]), *args, borderMode=cv2.BORDER_REPLICATE)
+            cv2.remap(
+                np.ascontiguousarray(self.layers[..., k : k + 3]),
+                *args,
+                borderMode=cv2.BORDER_REPLICATE,
+            )
             for k in (0, 3, 6)
         ]
         shape = (*plane.shape[:-1], 3)
@@ -78,20 +82,21 @@ def head_map(body: Body, model: BodyModel) -> HeadMap:
     if chart is None:
         chart = _CHARTS[model] = _chart(model)
     points = (chart.lookup @ body.points).reshape(SIZE, SIZE, 3)
-    points = _smooth(points, chart.weight)
+    middle = _middle(body, model)
+    points = _smooth(points, chart.weight, middle)
     down = np.gradient(points, axis=0)
     right = np.gradient(points, axis=1)
     normals = np.cross(right, down)
     layers = np.concatenate([points, normals, chart.place], 2).astype(np.float32)
-    return HeadMap(np.ascontiguousarray(layers), _middle(body, model))
+    return HeadMap(np.ascontiguousarray(layers), middle)
 
 
-def _middle(body: Body, model: BodyModel) -> Float32[np.ndarray, "3"]:
+def _middle(body: Body, model: BodyModel) -> Float32[np.ndarray, " 3"]:
     shift = MIDDLE - model.template.joint("head")
     return (body.joint("head") + shift).astype(np.float32)
 
 
-def to_plane(points: Float32[np.ndarray, "... 3"]) -> PlanePoints:
+def to_plane(points: Float32[np.ndarray, "*places 3"]) -> PlanePoints:
     """Where the template's points lie on the map."""
     x, y, z = np.moveaxis(points - MIDDLE, -1, 0)
     aside = np.hypot(x, y)
@@ -99,12 +104,25 @@ def to_plane(points: Float32[np.ndarray, "... 3"]) -> PlanePoints:
     return np.stack([x * scale, y * scale], -1)
 
 
-def _smooth(points: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Fill in the ears from around them; soften all a little."""
+def _smooth(points: np.ndarray, chart_weight: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Bring the ears down to what is around them; soften all a little.
+
+    Only distances from the middle are filled in: directions are the ears' own, so that the map
+    does not fold; and blurring distances does not draw a round surface inward as points would.
+    """
+    away = points - middle
+    length = np.linalg.norm(away, axis=2, keepdims=True)
+    known = (length < 0.5).astype(np.float32)  # nothing was seen: the point is the origin
+    toward = away / np.maximum(length, 1e-6) * known
+    weight = chart_weight * known
     spread = cv2.GaussianBlur(weight, (0, 0), 4.0)[..., None]
-    filled = cv2.GaussianBlur(points * weight, (0, 0), 4.0) / np.maximum(spread, 1e-4)
+    filled = cv2.GaussianBlur(length * weight, (0, 0), 4.0)[..., None] / np.maximum(spread, 1e-4)
     own = np.clip(2 * cv2.GaussianBlur(weight, (0, 0), 1.5) - 1, 0, 1)[..., None]
-    return cv2.GaussianBlur(points * own + filled * (1 - own), (0, 0), 1.0)
+    length = cv2.GaussianBlur(length * own + filled * (1 - own), (0, 0), 1.0)[..., None]
+    toward = cv2.GaussianBlur(toward, (0, 0), 1.0)
+    return middle + toward * (
+        length / np.maximum(np.linalg.norm(toward, axis=2, keepdims=True), 1e-6)
+    )
 
 
 def _chart(model: BodyModel) -> _Chart:
@@ -126,18 +144,20 @@ def _chart(model: BodyModel) -> _Chart:
     a, b, c = (pixel[faces[ids[seen], k]] for k in range(3))
     at = np.stack([seen % SIZE, seen // SIZE], 1) + 0.5
     double = _cross(b - a, c - a)
-    for k, share in enumerate((_cross(b - at, c - at), _cross(c - at, a - at), _cross(a - at, b - at))):
+    for k, share in enumerate(
+        (_cross(b - at, c - at), _cross(c - at, a - at), _cross(a - at, b - at))
+    ):
         rows.append(seen)
         columns.append(faces[ids[seen], k])
         shares.append(share / double)
     entries = (np.concatenate(shares), (np.concatenate(rows), np.concatenate(columns)))
-    lookup = csr_array(entries, shape=(SIZE * SIZE, len(points))).astype(np.float32)
+    lookup = csr_array(entries, shape=(SIZE * SIZE, len(points)), dtype=np.float32)
     place = (lookup @ points).reshape(SIZE, SIZE, 3)
     x, y, z = np.abs(place[..., 0]), place[..., 1], place[..., 2]
     ear = (x > 0.070) & (y > -0.076) & (y < -0.018) & (z > 1.662) & (z < 1.738)
     ear = cv2.dilate(ear.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     weight = (known.reshape(SIZE, SIZE) & ~ear).astype(np.float32)[..., None]
-    return _Chart(lookup, weight, _smooth(place, weight).astype(np.float32))
+    return _Chart(lookup, weight, _smooth(place, weight, MIDDLE).astype(np.float32))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ def _foot_path(stride: float) -> Loop:
     The foot comes down on the heel, rolls flat, and leaves over the ball.
     """
     times = np.array([0.0, 0.04, 0.09, 0.18, 0.28, 0.36, 0.44, 0.5, 0.55, 0.6])
-    heel = np.array([-20, -11, 0, 0, 0, 0, 5, 14, 31, 55]) * RAD * min(1.0, 0.4 + 0.45 * stride)
+    heel = np.array([-20, -11, 0, 0, 0, 4, 10, 18, 33, 55]) * RAD * min(1.0, 0.4 + 0.45 * stride)
     sole = 0.4 * STANCE * stride - stride * times
     lifted = np.maximum(heel, 0)
     ankle = sole + BALL[0] * (1 - np.cos(lifted)) + BALL[1] * np.sin(lifted)
@@ -72,7 +72,7 @@ def walk_pose(phase: float, stride: float = 1.3, swing: float = 1.0) -> Pose:
     """One instant of a walk on the spot; phase 0 is the left heel's strike.
 
     Args:
-        stride: two steps, in leg lengths; 1.3 is a calm walk (some 1.2 m).
+        stride: two steps, 0.6 to 1.4 leg lengths; 1.3 is a calm walk (some 1.2 m).
         swing: of the arms and the trunk; 1 is usual.
     """
     turn = 2 * pi * phase
@@ -81,7 +81,7 @@ def walk_pose(phase: float, stride: float = 1.3, swing: float = 1.0) -> Pose:
     sway = sin(turn - 0.35)  # 1 with the weight on the left leg
     pelvis = Bend(3 * RAD, -3.5 * RAD * sway * size, -5 * RAD * lead * size)
     # lowest with both feet on the floor, highest over one of them
-    height = 0.989 - 0.015 * size**2 - 0.015 * size**2 * cos(2 * turn - 0.3)
+    height = 0.9915 - 0.021 * size**2 - 0.015 * size**2 * cos(2 * turn - 0.3)
     feet = []
     for shift, side in ((0.0, 1), (0.5, -1)):
         forward, up, heel = _foot_path(round(stride, 3))((phase + shift) % 1.0)

@@ -18,7 +18,7 @@ from motion_transfer.people.body import Faces, Points, SkinWeights
 from motion_transfer.people.cuts import Places
 from motion_transfer.people.surface import BodySurface, Limb, along_polyline
 
-TEXELS_PER_METRE = 330.0
+TEXELS_PER_METRE = 270.0
 _FRONT_TO_BACK = -0.02  # y of the seam on the shoulders and at the sides
 
 
@@ -41,6 +41,8 @@ class Pattern:
         readers: read the tables of tubes: "trunk" at all vertices, "arm.L" and so on at `limbs`.
         limbs: numbers (in the pattern) of the vertices on each limb.
         shares: how much each of those vertices hangs from the tube, 0..1.
+        loose: V, how much slow folds show, 0..1: less where another garment may lie over it.
+        trunk_columns: the texels' columns that the first panel takes (a top's trunk).
     """
 
     kind: str
@@ -58,13 +60,16 @@ class Pattern:
     readers: dict[str, csr_array]
     limbs: dict[str, np.ndarray]
     shares: dict[str, np.ndarray]
+    loose: np.ndarray
+    trunk_columns: int
 
 
 def _smoother(surface: BodySurface, index: np.ndarray) -> csr_array:
     links = surface.mesh[index][:, index]
     degree = np.asarray(links.sum(1)).ravel()
     mean = diags_array(1 / np.maximum(degree, 1e-6)) @ links
-    return csr_array((mean + eye_array(len(index))) / 2).astype(np.float32)
+    half = (mean + eye_array(len(index))) / 2
+    return csr_array(half, dtype=np.float32)
 
 
 def _pattern(
@@ -83,6 +88,7 @@ def _pattern(
     fields = [surface.x, surface.y, surface.z, surface.arm_along, surface.leg_along]
     fields.append(surface.below_neck)
     values = np.stack([field[index] for field in fields] + [on_arm.astype(np.float32)], 1)
+    first = charts.corner_uv[charts.chart == charts.chart[0]]
     maps, seam = flat.flat_map(charts, values, local, TEXELS_PER_METRE)
     readers, limbs, shares = _hangers(kind, surface, index)
     columns = [np.ascontiguousarray(maps[..., k]) for k in range(maps.shape[2])]
@@ -102,12 +108,20 @@ def _pattern(
         readers=readers,
         limbs=limbs,
         shares=shares,
+        loose=_loose(kind, surface, index),
+        trunk_columns=int((first[..., 0].max() + 0.006) * TEXELS_PER_METRE),
     )
 
 
 def _ramp(values: np.ndarray, start: float, end: float) -> np.ndarray:
     t = np.clip((values - start) / (end - start), 0, 1)
     return (t * t * (3 - 2 * t)).astype(np.float32)
+
+
+def _loose(kind: str, surface: BodySurface, index: np.ndarray) -> np.ndarray:
+    if kind == "bottom":
+        return _ramp(surface.leg_along[index], 0.1, 0.3)
+    return 0.4 + 0.6 * _ramp(surface.armpit - surface.z[index], -0.05, 0.1)
 
 
 def _hangers(

@@ -151,7 +151,7 @@ def _fashion(rng: Rng) -> Pose:
 
 
 def _walking(rng: Rng) -> Pose:
-    pose = walk_pose(rng.random(), round(rng.uniform(0.8, 1.5), 1), rng.uniform(0.6, 1.5))
+    pose = walk_pose(rng.random(), round(rng.uniform(0.8, 1.4), 1), rng.uniform(0.6, 1.5))
     if rng.random() < 0.2:  # one hand busy
         name = _one_of(rng, "pocket bent greeting hip_back hair")
         pose = replace(pose, left_arm=drawn(rng, name), touches=touches(name, "L"))

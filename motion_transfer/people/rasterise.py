@@ -13,9 +13,9 @@ import warp as wp
 from jaxtyping import Float32, Int32, UInt64
 
 from motion_transfer.people.body import Faces
+from motion_transfer.people.extra import start_warp
 
-wp.config.quiet = True
-wp.init()
+start_warp()
 
 EMPTY = np.uint64(0xFFFFFFFFFFFFFFFF)
 

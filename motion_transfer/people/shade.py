@@ -14,7 +14,14 @@ from motion_transfer.people.body import Faces, Points
 from motion_transfer.people.camera import Camera
 from motion_transfer.people.light import Light
 from motion_transfer.people.mesh import Piece, PosedBody
-from motion_transfer.people.rasterise import EMPTY, Layer, depths, rasterise, share_array
+from motion_transfer.people.rasterise import (
+    EMPTY,
+    Layer,
+    depths,
+    rasterise,
+    share_array,
+    triangle_ids,
+)
 
 SAMPLES = 2
 """Samples along each side of a pixel."""
@@ -122,8 +129,8 @@ def _key_share(
 
 @wp.kernel(enable_backward=False)
 def _shade(
-    nearest: wp.array(dtype=wp.uint64),
-    first_id: wp.int32,
+    sample: wp.array(dtype=wp.int32),
+    seen_face: wp.array(dtype=wp.int32),
     screen: wp.array(dtype=wp.vec3),
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
@@ -137,12 +144,10 @@ def _shade(
     samples: wp.int32,
     colour: wp.array2d(dtype=wp.vec4),
 ):
-    row, column = wp.tid()
+    i = wp.tid()
+    face = seen_face[i]
     width = colour.shape[1] * samples
-    packed = nearest[row * width + column]
-    face = int(wp.uint32(packed & wp.uint64(0xFFFFFFFF))) - first_id
-    if face < 0 or face >= faces.shape[0]:
-        return
+    row, column = sample[i] // width, sample[i] % width
     corners = faces[face]
     sa, sb, sc = screen[corners[0]], screen[corners[1]], screen[corners[2]]
     px, py = float(column) + 0.5, float(row) + 0.5
@@ -248,11 +253,14 @@ def shade(
     shadow_map, lamp = _light_input(light, camera, pieces, points)
     openness = _openness(nearest, fine, light)
     out = wp.zeros((camera.height, camera.width), dtype=wp.vec4, device="cpu")
+    sample = np.flatnonzero(nearest != EMPTY).astype(np.int32)
+    face = triangle_ids(nearest[sample])
     first_id = 0
     for piece, layer, moved in zip(pieces, layers, points, strict=True):
+        own = np.flatnonzero((face >= first_id) & (face < first_id + len(piece.faces)))
         inputs = [
-            share_array(nearest, wp.uint64),
-            first_id,
+            share_array(sample[own], wp.int32),
+            share_array(face[own] - np.int32(first_id), wp.int32),
             share_array(layer.screen, wp.vec3),
             share_array(moved, wp.vec3),
             share_array(vertex_normals(moved, piece.faces), wp.vec3),
@@ -265,7 +273,7 @@ def shade(
             share_array(openness, wp.float32),
             SAMPLES,
         ]
-        wp.launch(_shade, (fine.height, fine.width), inputs=inputs, outputs=[out], device="cpu")
+        wp.launch(_shade, len(own), inputs=inputs, outputs=[out], device="cpu")
         first_id += len(piece.faces)
     rgba = out.numpy()
     return Shading(rgba[..., :3], rgba[..., 3])

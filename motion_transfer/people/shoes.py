@@ -9,14 +9,14 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from motion_transfer.people.body import Body, SkinWeights
+from motion_transfer.people.clothes import Shoes
 from motion_transfer.people.mesh import Material, Piece
-from motion_transfer.people.outfits import Shoes
 from motion_transfer.people.skirts import grid_faces, grid_uv
 from motion_transfer.people.surface import BodySurface, Limb
 from motion_transfer.people.tailoring import band, linear
 
 _ROWS, _COLUMNS = 18, 28
-_TEXTURE = (128, 192)  # rows from the opening over the upper down to the sole; columns around
+_TEXTURE = (80, 128)  # rows from the opening over the upper down to the sole; columns around
 _DIRECTIONS = 200
 
 
@@ -39,8 +39,8 @@ def _rays() -> np.ndarray:
     return rays.reshape(-1, 3).astype(np.float32)
 
 
-def hull(points: np.ndarray, margin: float, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A rounded convex hull as a grid of points, and its middle.
+def hull(points: np.ndarray, margin: float, stretch: np.ndarray) -> np.ndarray:
+    """A rounded convex hull as a grid of points.
 
     Args:
         stretch: 3; rays are spread over a box of these proportions, so that long hulls are evenly
@@ -54,45 +54,45 @@ def hull(points: np.ndarray, margin: float, stretch: np.ndarray) -> tuple[np.nda
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     closeness = np.maximum(rays @ planes.T, 0) / reach
     nearest = closeness.max(1, keepdims=True)
-    rounded = nearest[:, 0] * ((closeness / nearest) ** 30).sum(1) ** (1 / 30)
-    return middle + rays / rounded[:, None], middle
+    power = closeness / nearest
+    for _ in range(6):  # to the 64th: a smooth maximum
+        power *= power
+    rounded = nearest[:, 0] * power.sum(1) ** (1 / 64)
+    return middle + rays / rounded[:, None]
 
 
 def shoe_pieces(shoes: Shoes, surface: BodySurface, body: Body) -> list[Piece]:
     """Both shoes; empty for bare feet."""
     if shoes.kind == "bare":
         return []
-    return [_shoe(shoes, surface, body, side) for side in "LR"]
-
-
-def _shoe(shoes: Shoes, surface: BodySurface, body: Body, side: str) -> Piece:
-    foot = surface.is_limb(Limb[f"FOOT_{side}"]) & (surface.z < _TOP)
+    foot = surface.is_limb(Limb.FOOT_L) & (surface.z < _TOP)
     own = body.points[foot]
     scale = body.height / surface.model.template.height
-    points, _ = hull(own, 0.006, np.array([0.5, 1.0, 0.5], np.float32))
+    points = hull(own, 0.012 * scale, np.array([0.5, 1.0, 0.5], np.float32))
     low = float(own[:, 2].min())
-    # a sole: everything near the ground goes straight down to it
+    # everything near the ground goes straight down to the sole
     ground = low - 0.012 * scale
-    points[:, 2] = np.where(points[:, 2] < low + 0.012, np.maximum(points[:, 2], ground), points[:, 2])
+    near = points[:, 2] < low + 0.012
+    points[near, 2] = np.maximum(points[near, 2], ground)
+    points = points.astype(np.float32)
+    material = Material(_painted(shoes, points, ground, low), (0.7, 0.25), gloss=shoes.gloss)
+    keep = _cut(shoes, points, ground)
+    return [_shoe(points, material, keep, surface, side) for side in "LR"]
+
+
+def _shoe(
+    points: np.ndarray, material: Material, keep: np.ndarray, surface: BodySurface, side: str
+) -> Piece:
+    """The left shoe, or its mirror image."""
+    faces, uv = grid_faces(_ROWS, _COLUMNS), grid_uv(_ROWS, _COLUMNS)
+    if side == "R":
+        points = points * np.array([-1, 1, 1], np.float32)
+        faces, uv = faces[:, ::-1].copy(), uv[:, ::-1].copy()
     bone = surface.model.skeleton.index[f"foot.{side}"]
-    weights = csr_array(
-        (
-            np.ones(len(points), np.float32),
-            (np.arange(len(points)), np.full(len(points), bone)),
-        ),
-        (len(points), len(surface.model.skeleton.names)),
-    )
-    keep = np.ones(len(points), np.float32)
-    return Piece(
-        name="shoes",
-        points=points.astype(np.float32),
-        faces=grid_faces(_ROWS, _COLUMNS),
-        weights=SkinWeights(weights),
-        corner_uv=grid_uv(_ROWS, _COLUMNS),
-        material=Material(_painted(shoes, points, ground, low), (0.7, 0.25), gloss=shoes.gloss),
-        keep=keep,
-        two_sided=True,
-    )
+    ones = np.ones(len(points), np.float32)
+    place = np.arange(len(points)), np.full(len(points), bone)
+    matrix = csr_array((ones, place), (len(points), len(surface.model.skeleton.names)))
+    return Piece("shoes", points, faces, SkinWeights(matrix), uv, material, keep, two_sided=True)
 
 
 _TOP = 0.085  # height on the template up to which a foot is inside a low shoe
@@ -107,11 +107,11 @@ def _painted(shoes: Shoes, points: np.ndarray, ground: float, low: float) -> np.
     height = place[..., 2] - ground
     toe, heel = grid[..., 1].min(), grid[..., 1].max()
     along = (place[..., 1] - toe) / (heel - toe)  # 0 at the toes, 1 at the heel
-    colours = np.broadcast_to(np.float32(shoes.colour), (rows, columns, 3)).copy()
+    colours = np.broadcast_to(np.asarray(shoes.colour, np.float32), (rows, columns, 3)).copy()
     relief = np.zeros((rows, columns), np.float32)
 
     def tint(cover: np.ndarray, colour: tuple[float, float, float]) -> None:
-        colours[...] += cover[..., None] * (np.float32(colour) - colours)
+        colours[...] += cover[..., None] * (np.asarray(colour, np.float32) - colours)
 
     middle = np.abs(np.mod(np.arange(columns) / columns + 0.5, 1) - 0.5)[None] * np.ones((rows, 1))
     if shoes.kind in ("sneakers", "trainers", "boots"):
@@ -124,5 +124,31 @@ def _painted(shoes: Shoes, points: np.ndarray, ground: float, low: float) -> np.
         tint(band(along, -1, 0.16, 0.01) * (height > 0.02) * 0.5, shoes.sole)
         tint(band(along - 0.3 * (height - 0.05) * 4, 0.62, 0.70, 0.01) * 0.9, shoes.trim)
     tint(band(height, -1, shoes.sole_height, 0.004), shoes.sole)
-    colours *= 1 - 0.35 * band(height, shoes.sole_height, shoes.sole_height + 0.004, 0.003)[..., None]
+    colours *= (
+        1 - 0.35 * band(height, shoes.sole_height, shoes.sole_height + 0.004, 0.003)[..., None]
+    )
     return cv2.merge([*cv2.split(linear(colours.astype(np.float32))), relief])
+
+
+def _cut(shoes: Shoes, points: np.ndarray, ground: float) -> np.ndarray:
+    """Where the hull is kept: all of it but the openings of flats and sandals."""
+    height = points[:, 2] - ground
+    toe, heel = points[:, 1].min(), points[:, 1].max()
+    along = (points[:, 1] - toe) / (heel - toe)
+    if shoes.kind == "flats":
+        rim = 0.038 + 0.25 * np.maximum(0.32 - along, 0) + 0.12 * np.maximum(along - 0.8, 0)
+        return (rim - height).astype(np.float32)
+    if shoes.kind == "sandals":
+        sole = shoes.sole_height + 0.004 - height
+        strap = 0.035 - np.abs(along - 0.36) * 0.3
+        around = 0.02 - np.abs(along - 0.72) * 0.25
+        return np.maximum(sole, np.maximum(strap - 0.01, around - 0.006)).astype(np.float32)
+    return np.ones(len(points), np.float32)
+
+
+def shoe_keep(shoes: Shoes, surface: BodySurface) -> np.ndarray:
+    """Where the skin is seen beside the shoes; V, as a piece's `keep`."""
+    if shoes.kind in ("bare", "flats", "sandals"):
+        return np.ones(len(surface.z), np.float32)
+    feet = surface.is_limb(Limb.FOOT_L, Limb.FOOT_R)
+    return np.where(feet, surface.z - np.float32(_TOP - 0.02), 1).astype(np.float32)

@@ -6,6 +6,7 @@ import numpy as np
 
 from motion_transfer.people.body import Body, BodyModel
 from motion_transfer.people.face_paint import paint_eyes, paint_skin
+from motion_transfer.people.face_wear import wear_pieces
 from motion_transfer.people.faces import Face
 from motion_transfer.people.mesh import Material, Piece
 from motion_transfer.people.skin_atlas import HEAD_ROWS, STRIP_ROWS, WIDTH, skin_atlas
@@ -29,7 +30,7 @@ def skin_pieces(face: Face, body: Body, model: BodyModel) -> list[Piece]:
         weights=model.weights,
         corner_uv=atlas.skin_uv,
         material=Material(
-            paint_skin(face, atlas), _SKIN_METRES, gloss=0.10, sharpness=9.0, translucency=0.3
+            paint_skin(face, atlas), _SKIN_METRES, gloss=0.045, sharpness=10.0, translucency=0.3
         ),
         keep=np.ones(len(body.points), np.float32),
     )
@@ -39,7 +40,7 @@ def skin_pieces(face: Face, body: Body, model: BodyModel) -> list[Piece]:
         faces=atlas.eyes,
         weights=model.weights.rows(atlas.eye_points),
         corner_uv=atlas.eye_uv,
-        material=Material(paint_eyes(face), (0.06, 0.03), gloss=0.3, sharpness=60.0),
+        material=Material(paint_eyes(face), (0.06, 0.03), gloss=0.25, sharpness=60.0),
         keep=np.ones(len(atlas.eye_points), np.float32),
     )
-    return [skin, eyes]
+    return [skin, eyes, *wear_pieces(face, body, model)]

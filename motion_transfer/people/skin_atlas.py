@@ -27,7 +27,7 @@ EYE_PX, EYE_SPAN = 48, 0.030  # an eye's tile, and the width of the eyeball it s
 _FRONT = 0.4  # the front has 1 + _FRONT times the columns an even unrolling would give it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # identity is enough, and it can be a key
 class SkinAtlas:
     """The texture's layout. The head has HEAD_ROWS rows and WIDTH columns.
 
@@ -146,7 +146,9 @@ def _kind(model: BodyModel) -> Float32[np.ndarray, " V"]:
         index, little = (body.joint(f"finger{k}-1.{side}") for k in (2, 5))
         across = np.cross(index - wrist, little - wrist)
         across *= -np.sign(across[2]) / np.linalg.norm(across)  # palms look down at rest
-        hand = np.array([n.startswith(("wrist", "finger", "metacarpal")) for n in body.skeleton.names])
+        hand = np.array(
+            [n.startswith(("wrist", "finger", "metacarpal")) for n in body.skeleton.names]
+        )
         hand &= np.array([n.endswith(side) for n in body.skeleton.names])
         share = np.asarray(model.weights.matrix[:, np.flatnonzero(hand)].sum(1)).ravel()
         facing = (vertex_normals(points, model.faces) @ across).clip(0, 1)

@@ -14,15 +14,15 @@ from jaxtyping import Float32
 from scipy.sparse import csr_array
 
 from motion_transfer.people.body import Faces, Points, SkinWeights
+from motion_transfer.people.clothes import Skirt
 from motion_transfer.people.cuts import ramp
 from motion_transfer.people.fit import Fitting
 from motion_transfer.people.mesh import PosedBody
-from motion_transfer.people.outfits import Skirt
-from motion_transfer.people.surface import BodySurface, along_polyline
+from motion_transfer.people.surface import BodySurface
 
 COLUMNS = 48
 ROWS = 26
-_CLEARANCE = 0.006  # metres between legs and cloth
+_CLEARANCE = 0.012  # metres between legs and cloth
 _RINGS = (0, 3, 6, 9, 12, 15)  # rows of a leg's table that bound the cones standing for the leg
 Grid = Float32[np.ndarray, "rows columns"]
 
@@ -71,11 +71,14 @@ def grid_uv(rows: int, columns: int) -> np.ndarray:
     return np.stack([upper, lower], 2).reshape(-1, 3, 2).astype(np.float32)
 
 
-def shape_skirt(skirt: Skirt, fitting: Fitting, ease: float = 0.0) -> SkirtShape:
+def shape_skirt(
+    skirt: Skirt, fitting: Fitting, ease: float = 0.0, flare_below: float = 9.0
+) -> SkirtShape:
     """Cut a skirt to a body's measure.
 
     Args:
         ease: of what is worn below it at the upper edge, metres.
+        flare_below: height on the template below which it may stand off, metres.
     """
     body = fitting.body
     scale = body.height / fitting.surface.model.template.height
@@ -90,8 +93,8 @@ def shape_skirt(skirt: Skirt, fitting: Fitting, ease: float = 0.0) -> SkirtShape
     reach = np.maximum(_trunk_reach(fitting, z, angles), _legs_reach(fitting, z, angles))
     snug = _hull_radii(reach) + np.float32(skirt.ease + ease)
     near_top = ramp(top - z, 0.0, 0.08)[:, None]  # snug at the waistband
-    snug = snug - np.float32(skirt.ease * 0.6) * (1 - near_top)
-    radius = _flared(skirt, snug, z, hip, angles)
+    snug = snug - np.float32(skirt.ease * 0.3) * (1 - near_top)
+    radius = _flared(skirt, snug, z, hip, angles, flare_below * scale)
     x, y = radius * np.sin(angles), axis - radius * np.cos(angles)
     points = np.stack([x, y, np.broadcast_to(z[:, None], x.shape)], -1).reshape(-1, 3)
     outward = np.stack([np.sin(angles), -np.cos(angles), 0 * angles], -1)
@@ -100,7 +103,7 @@ def shape_skirt(skirt: Skirt, fitting: Fitting, ease: float = 0.0) -> SkirtShape
     return SkirtShape(
         points=points.astype(np.float32),
         outward=outward.astype(np.float32),
-        weights=_weights(skirt, fitting, z, x, radius, hip),
+        weights=_weights(fitting, z, x, radius, hip),
         down=np.concatenate([[0], np.cumsum(steps)]).astype(np.float32),
         around=float(2 * np.pi * radius[ROWS // 3 :].mean()),
     )
@@ -145,9 +148,12 @@ def _hull_radii(reach: Grid) -> Grid:
     return (reach[:, None, :] * _secants()).min(2)
 
 
-def _flared(skirt: Skirt, snug: Grid, z: np.ndarray, hip: float, angles: np.ndarray) -> Grid:
+def _flared(
+    skirt: Skirt, snug: Grid, z: np.ndarray, hip: float, angles: np.ndarray, highest: float
+) -> Grid:
     """Radii: snug down to the hips, then falling outwards, with waves towards the hem."""
-    below = np.maximum(hip - z, 0)
+    below = np.maximum(min(hip, highest) - z, 0)
+    start = min(float(z[0]), highest)
     radius = snug
     at_hip = int(np.argmin(np.abs(z - hip)))
     if z[-1] < hip:
@@ -156,21 +162,18 @@ def _flared(skirt: Skirt, snug: Grid, z: np.ndarray, hip: float, angles: np.ndar
         flare = rounder + np.float32(skirt.flare) * below[:, None]
         radius = np.where(below[:, None] > 0, np.maximum(radius, flare), radius)
     if skirt.kind in ("circle", "a_line", "maxi", "tiered") and skirt.flare > 0.15:
-        start = radius[0].mean()
-        early = radius[0] + np.float32(0.6 * skirt.flare) * (z[0] - z)[:, None]
-        radius = np.maximum(radius, early) if start > 0 else radius
+        early = radius[0] + np.float32(0.6 * skirt.flare) * (start - z)[:, None]
+        radius = np.where((z < start)[:, None], np.maximum(radius, early), radius)
     if skirt.waves:
         rng = np.random.default_rng(skirt.seed)
         phase = skirt.waves * angles + 0.5 * np.sin(2 * angles + rng.uniform(0, 6.28))
         wave = np.sin(phase + rng.uniform(0, 6.28))
-        grown = ramp(z[0] - z, 0.06, max(float(z[0] - z[-1]), 0.2))
+        grown = ramp(start - z, 0.06, max(start - float(z[-1]), 0.2))
         radius = radius + np.float32(skirt.wave_height) * grown[:, None] * (wave + 0.6)
     return radius.astype(np.float32)
 
 
-def _weights(
-    skirt: Skirt, fitting: Fitting, z: np.ndarray, x: Grid, radius: Grid, hip: float
-) -> SkinWeights:
+def _weights(fitting: Fitting, z: np.ndarray, x: Grid, radius: Grid, hip: float) -> SkinWeights:
     """Rigid with the pelvis above the hips, then shared by the thighs, then by the shins."""
     body = fitting.body
     names = body.skeleton.index
@@ -212,7 +215,8 @@ def leg_cones(surface: BodySurface, points: Points, clearance: float = 0.0) -> C
     for name in ("leg.L", "leg.R"):
         rings = surface.limb_tubes[name].gather(points)[list(_RINGS)]
         centre = rings.mean(1)
-        radius = np.linalg.norm(rings - centre[:, None], axis=2).mean(1) * 1.04 + clearance
+        away = np.sort(np.linalg.norm(rings - centre[:, None], axis=2), axis=1)
+        radius = away[:, -2] + clearance  # thighs are not round
         starts.append(centre[:-1])
         ends.append(centre[1:])
         radii.append(np.stack([radius[:-1], radius[1:]], 1))
@@ -236,6 +240,7 @@ def exit_distance(points: Points, outward: Points, cones: Cones) -> np.ndarray:
         dd = np.einsum("ni,ni->n", d, d) + 1e-6
         md, mm = np.einsum("ni,ni->n", m, d), np.einsum("ni,ni->n", m, m)
         at = np.clip(along_p / long, 0, 1)
+        root, inside = -md, mm
         for _ in range(2):
             radius = radii[0] + (radii[1] - radii[0]) * at
             inside = md * md - dd * (mm - radius * radius)
@@ -274,9 +279,9 @@ def _sunk(push: Grid, upward: Grid) -> Grid:
     weight = ramp(upward, 0.15, 0.6)
     known = ((push > -1) & (push < 0)) * weight
     slack = known * np.clip(-push, 0, 0.3)
-    for _ in range(4):
+    for _ in range(9):
         slack, known = _spread(slack), _spread(known)
-    sunk = weight * slack / np.maximum(known, 0.02)
+    sunk = weight * slack / np.maximum(known, 1e-4)
     return np.where(push > 0, 0, np.minimum(sunk, np.where(push > -1, -push, 0.3)))
 
 

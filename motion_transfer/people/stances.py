@@ -65,7 +65,8 @@ def leg_to(foot: Foot, height: float) -> Leg:
     # the shin's view of "up" says how to hold the ankle
     up = (leg_chain(leg) @ turned(leg.knee, 0, 0)).T[:, 2]
     ankle = atan2(up[1], up[2]) - foot.heel
-    toes = 0.8 * max(foot.heel, 0.0)
+    heel = max(foot.heel, 0.0)
+    toes = heel * heel / (heel + 0.15)  # stay on the floor; without a jerk as the heel lifts off
     return Leg(hip, out, foot.turn_out, 2 * half, ankle, float(np.arcsin(up[0])), toes)
 
 

@@ -17,8 +17,8 @@ from jaxtyping import Float32, Int8
 from scipy.sparse import csr_array, diags_array
 
 from motion_transfer.people.body import Body, BodyModel, Points
+from motion_transfer.people.cuts import Levels, Places
 from motion_transfer.people.flattening import corner_sums, vertex_normals
-from motion_transfer.people.cuts import Levels
 from motion_transfer.people.tubes import Tube
 
 Field = Float32[np.ndarray, " V"]
@@ -141,8 +141,7 @@ class BodySurface:
         )
         where |= right.any(1)
         s, _ = along_polyline(mirrored.astype(np.float32), self.limb_joints(body, kind, "L"))
-        out = np.where(where, s, -1).astype(np.float32)
-        return out
+        return np.where(where, s, -1).astype(np.float32)
 
     @staticmethod
     def limb_joints(body: Body, kind: str, side: str) -> np.ndarray:
@@ -169,6 +168,13 @@ class BodySurface:
         return {kind: self.limb_length(self.model.template, kind) for kind in ("arm", "leg")}
 
     @cached_property
+    def places(self) -> Places:
+        """All vertices of the skin, as garments' edges are worked out for them."""
+        on_arm = self.is_limb(Limb.ARM_L, Limb.ARM_R, Limb.HAND_L, Limb.HAND_R)
+        fields = (self.x, self.y, self.z, self.arm_along, self.leg_along, self.below_neck)
+        return Places(*fields, on_arm.astype(np.float32))
+
+    @cached_property
     def levels(self) -> Levels:
         """Heights and lengths that garments are cut by."""
         lengths = self.template_lengths
@@ -186,16 +192,18 @@ class BodySurface:
         outward = (normals[:, :2] * radial).sum(1) > 0.4 * np.linalg.norm(radial, axis=1)
         inside &= outward | (down < 0.2)  # not the insides of the thighs
         angle = np.arctan2(self.x, -(self.y - centre_y))
-        return Tube(down, angle, inside, levels=np.linspace(0, self.armpit - self.crotch + 0.04, 16))
+        return Tube(
+            down, angle, inside, levels=np.linspace(0, self.armpit - self.crotch + 0.04, 16)
+        )
 
     @cached_property
     def neck_tube(self) -> Tube:
         """Around the neck: levels are `below_neck`."""
-        inside = (self.below_neck > -0.09) & (self.below_neck < 0.06) & (np.abs(self.x) < 0.12)
+        inside = (self.below_neck > -0.09) & (self.below_neck < 0.11) & (np.abs(self.x) < 0.13)
         inside &= self.is_limb(Limb.TORSO, Limb.NECK) | ((self.limb == Limb.HEAD) & (self.y > -0.1))
         centre_y = float(self.model.template.joint("neck01")[1]) - 0.01
         angle = np.arctan2(self.x, -(self.y - centre_y))
-        return Tube(self.below_neck, angle, inside, levels=np.linspace(-0.06, 0.04, 11))
+        return Tube(self.below_neck, angle, inside, levels=np.linspace(-0.06, 0.09, 16))
 
     @cached_property
     def limb_tubes(self) -> dict[str, Tube]:
@@ -206,7 +214,7 @@ class BodySurface:
             along = self.arm_along if kind == "arm" else self.leg_along
             end = self.template_lengths[kind]
             for side, sign in (("L", 1), ("R", -1)):
-                own = self.is_limb(*(l for l in Limb if l.name in _limb_names(kind, side)))
+                own = self.is_limb(*(part for part in Limb if part.name in _limb_names(kind, side)))
                 inside = own & (along > start - 0.05) & (along < end + 0.04)
                 _, axis = along_polyline(body.points, self.limb_joints(body, kind, side))
                 away = body.points - axis

@@ -34,12 +34,15 @@ def linear(colours: Float32[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"
 
 @cache
 def crease_tiles() -> np.ndarray:
-    """Reliefs of creased cloth, tiles x _TILE x _TILE, deviation 1, ridges in several directions."""
+    """Reliefs of creased cloth with ridges in several directions.
+
+    Returns: tiles x _TILE x _TILE, of deviation 1.
+    """
     rng = np.random.default_rng(20)
     tiles = []
-    for angle in (20, -25, 65, -60, 5, 90):
+    for angle in (30, -35, 65, -60, 45, 85):
         waves = np.zeros((_TILE, _TILE), np.float32)
-        for along, across, gain in ((40, 7, 1.0), (22, 3.5, 0.35)):
+        for along, across, gain in ((55, 11, 1.0), (30, 5, 0.3)):
             noise = rng.normal(size=(_TILE * 2, _TILE * 2)).astype(np.float32)
             noise = cv2.GaussianBlur(noise, (0, 0), sigmaX=along, sigmaY=across)
             turn = cv2.getRotationMatrix2D((_TILE, _TILE), angle, 1)
@@ -51,16 +54,17 @@ def crease_tiles() -> np.ndarray:
     return np.stack(tiles)
 
 
-def creases(shape: tuple[int, int], rng: np.random.Generator) -> Float32[np.ndarray, "H W"]:
-    """A relief of creased cloth of deviation about 1."""
-    height, width = shape
+def creases(
+    shape: tuple[int, int], rng: np.random.Generator, height: float
+) -> Float32[np.ndarray, "H W"]:
+    """A relief of creased cloth whose deviation is about `height` metres."""
     tiles = crease_tiles()
-    out = np.zeros(shape, np.float32)
-    for gain in (0.8, 0.6):
+    parts = []
+    for _ in range(2):
         tile = tiles[rng.integers(len(tiles))]
-        y, x = rng.integers(_TILE - height + 1), rng.integers(_TILE - width + 1)
-        out += gain * tile[y : y + height, x : x + width]
-    return out
+        y, x = (int(rng.integers(_TILE - side + 1)) for side in shape)
+        parts.append(tile[y : y + shape[0], x : x + shape[1]])
+    return cv2.addWeighted(parts[0], 0.8 * height, parts[1], 0.6 * height, 0.0)
 
 
 class Panel:
@@ -68,42 +72,90 @@ class Panel:
 
     Attributes:
         colours: H x W x 3 sRGB, changed in place.
+        shade: H x W, what the colours are multiplied by in the end; changed in place.
         relief: H x W metres, changed in place.
     """
 
-    def __init__(self, colours: Float32[np.ndarray, "H W 3"]) -> None:
-        self.colours = np.ascontiguousarray(colours)
-        self.relief = np.zeros(colours.shape[:2], np.float32)
+    def __init__(
+        self,
+        colours: Float32[np.ndarray, "H W 3"],
+        shade: np.ndarray | None = None,
+        relief: np.ndarray | None = None,
+    ) -> None:
+        self.colours = colours
+        self.shade = np.ones(colours.shape[:2], np.float32) if shade is None else shade
+        self.relief = np.zeros(colours.shape[:2], np.float32) if relief is None else relief
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in texels."""
+        height, width = self.colours.shape[:2]
+        return height, width
+
+    def part(self, rows: slice, columns: slice) -> Panel:
+        """Part of the panel; changes to it are changes to the whole."""
+        at = rows, columns
+        return Panel(self.colours[at], self.shade[at], self.relief[at])
 
     def tint(self, cover: np.ndarray, colour: Colour) -> None:
         """Lay a colour over, `cover` (H x W, 0..1) of the way."""
-        rows, columns = _box(cover)
-        if rows is None:
-            return
-        part = self.colours[rows, columns]
-        part += cover[rows, columns, None] * (np.float32(colour) - part)
+        at = _box(cover)
+        part = self.colours[at]
+        part += cover[at][..., None] * (np.asarray(colour, np.float32) - part)
 
     def dim(self, cover: np.ndarray, share: float) -> None:
         """Darken by a share where `cover` is 1."""
-        rows, columns = _box(cover)
-        if rows is None:
-            return
-        self.colours[rows, columns] *= 1 - np.float32(share) * cover[rows, columns, None]
+        at = _box(cover)
+        self.shade[at] *= 1 - np.float32(share) * cover[at]
 
     def raise_by(self, cover: np.ndarray, metres: float) -> None:
         """Lift where `cover` is 1."""
-        self.relief += np.float32(metres) * cover
+        at = _box(cover)
+        self.relief[at] += np.float32(metres) * cover[at]
+
+    def stitch(self, distance: np.ndarray, place: float, strength: float = 0.14) -> None:
+        """A seam where a distance takes a value: a dark line in a shallow furrow."""
+        cover = line(distance, place, 0.005)
+        at = _box(cover)
+        part = cover[at]
+        self.shade[at] *= 1 - np.float32(strength) * part
+        self.relief[at] -= np.float32(0.0008) * part
+
+    def ribs(self, cover: np.ndarray, deep: float = 0.14) -> None:
+        """Ribbed knit along the columns where `cover` is 1."""
+        ribs = (np.arange(cover.shape[1]) % 3 == 0).astype(np.float32)
+        self.dim(cover * ribs, deep)
+
+    def decal(
+        self, image: Float32[np.ndarray, "h w 4"], across: np.ndarray, down: np.ndarray
+    ) -> None:
+        """Print an image where `across` and `down` (H x W) run from 0 to 1 over it.
+
+        Args:
+            image: sRGB and coverage, 0..1.
+        """
+        at = _box(((across > 0) & (across < 1) & (down > 0) & (down < 1)).astype(np.float32))
+        x = across[at] * np.float32(image.shape[1]) - np.float32(0.5)
+        y = down[at] * np.float32(image.shape[0]) - np.float32(0.5)
+        if x.size == 0:
+            return
+        ink = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        part = self.colours[at]
+        part += ink[..., 3:] * (ink[..., :3] - part)
 
     def texture(self) -> Float32[np.ndarray, "H W 4"]:
         """The finished texture."""
-        return cv2.merge([*cv2.split(linear(self.colours)), self.relief])
+        shaded = cv2.multiply(self.colours, cv2.merge([self.shade] * 3))
+        out = np.empty((*self.relief.shape, 4), np.float32)
+        cv2.mixChannels([linear(shaded), self.relief], [out], [0, 0, 1, 1, 2, 2, 3, 3])
+        return out
 
 
-def _box(cover: np.ndarray) -> tuple[slice | None, slice]:
-    """Rows and columns outside of which `cover` is 0; None for nothing at all."""
+def _box(cover: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns outside of which `cover` is 0."""
     rows = np.flatnonzero(cover.max(1) > 0)
     if len(rows) == 0:
-        return None, slice(0, 0)
+        return slice(0, 0), slice(0, 0)
     columns = np.flatnonzero(cover[rows[0] : rows[-1] + 1].max(0) > 0)
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 

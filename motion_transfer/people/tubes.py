@@ -1,4 +1,4 @@
-"""Tubes around limbs and trunk: the body's thickness as a small table, and cloth that hangs from it.
+"""Tubes around limbs and trunk: a body's thickness as small tables, and cloth that hangs on it.
 
 A tube's table has one row for each level along the limb and one column for each angle about it. A
 sparse operator averages the skin's vertices into cells, another one reads cells at vertices.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float32
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 ANGLES = 24
 Table = Float32[np.ndarray, "levels angles"]
@@ -47,7 +47,7 @@ class Tube:
         def on_circle(level: np.ndarray, angle: np.ndarray) -> np.ndarray:
             return np.stack([level, radius * np.cos(angle), radius * np.sin(angle)], -1)
 
-        tree = cKDTree(on_circle(self._level[index], self._angle[index]))
+        tree = KDTree(on_circle(self._level[index], self._angle[index]))
         level, angle = np.meshgrid(self.levels, self.angles, indexing="ij")
         distance, nearest = tree.query(on_circle(level, angle).reshape(-1, 3), k=3)
         share = 1 / (distance + 0.003)
@@ -62,13 +62,20 @@ class Tube:
         shape = (len(self.levels), ANGLES, *values.shape[1:])
         return (self._gather @ values).reshape(shape)
 
+    def at(self, level: np.ndarray, angle: np.ndarray) -> csr_array:
+        """The operator that averages the skin's values at places between the cells, N x V."""
+        return csr_array(self._between(level, angle) @ self._gather, dtype=np.float32)
+
     def reader(self, index: np.ndarray) -> csr_array:
         """The operator that reads a flattened table at some vertices (bilinear).
 
         Levels beyond the table's are held at its edges.
         """
-        row = np.interp(self._level[index], self.levels, np.arange(len(self.levels)))
-        column = np.mod(self._angle[index] / (2 * np.pi) * ANGLES, ANGLES)
+        return self._between(self._level[index], self._angle[index])
+
+    def _between(self, level: np.ndarray, angle: np.ndarray) -> csr_array:
+        row = np.interp(level, self.levels, np.arange(len(self.levels)))
+        column = np.mod(angle / (2 * np.pi) * ANGLES, ANGLES)
         r0 = np.minimum(row.astype(int), len(self.levels) - 2)
         c0 = column.astype(int) % ANGLES
         fr, fc = row - r0, column - np.floor(column)
@@ -77,9 +84,9 @@ class Tube:
             for dc, wc in ((0, 1 - fc), (1, fc)):
                 cells.append((r0 + dr) * ANGLES + (c0 + dc) % ANGLES)
                 shares.append(wr * wc)
-        rows = np.tile(np.arange(len(index)), 4)
+        rows = np.tile(np.arange(len(level)), 4)
         data = np.concatenate(shares).astype(np.float32)
-        size = (len(index), len(self.levels) * ANGLES)
+        size = (len(level), len(self.levels) * ANGLES)
         return csr_array((data, (rows, np.concatenate(cells))), size)
 
 

@@ -8,7 +8,6 @@ should touch something ask for a pull in the same way. No randomness.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import fields, replace
 from typing import TypeVar
 
@@ -17,7 +16,6 @@ from jaxtyping import Float64
 
 from motion_transfer.people.capsules import (
     FIRST,
-    INDEX,
     PARTS,
     SECOND,
     Capsules,
@@ -125,32 +123,39 @@ _GROUPS = (
     ("right_arm", ARM_ANGLES),
     ("right_leg", LEG_ANGLES),
 )
-_COLUMN = {"upperarm": 0, "forearm": 0, "hand": 0, "thigh": 4, "shin": 4, "foot": 4}
+# for each part: the group of four angles that moves it (4: none), and which of the four do
+_GROUP = np.array(
+    [
+        (2 * part.endswith("R") + part.startswith(("thigh", "shin", "foot"))) if "." in part else 4
+        for part in PARTS
+    ]
+)
+_MOVES = np.array(
+    [[True, True, True, not part.startswith(("upperarm", "thigh"))] for part in PARTS]
+)
 
 
 def _jacobian(
     pose: Pose, placement: Placement, contacts: Contacts, rows: np.ndarray
 ) -> Float64[np.ndarray, "rows 16"]:
     """How fast each gap opens with each angle, metres a radian."""
-    axes = _axes(pose, placement)
-    out = np.zeros((len(rows), 16))
-    for row, pair in enumerate(rows):
-        normal = contacts.normals[pair]
-        for part, point, sign in (
-            (PARTS[FIRST[pair]], contacts.near[pair], 1.0),
-            (PARTS[SECOND[pair]], contacts.far[pair], -1.0),
-        ):
-            limb, _, side = part.partition(".")
-            if not side:
-                continue
-            column = _COLUMN[limb] + 8 * (side == "R")
-            joints = (placement.arms if _COLUMN[limb] == 0 else placement.legs)[side == "R"]
-            moving = 3 if limb in ("upperarm", "thigh") else 4
-            # axis x (point - joint) . normal = axis . ((point - joint) x normal)
-            levers = np.cross(point - joints[[0, 0, 0, 1]], normal)
-            speeds = np.einsum("ij,ij->i", axes[column : column + 4], levers)
-            out[row, column : column + moving] += sign * speeds[:moving]
-    return out
+    axes = np.concatenate([_axes(pose, placement).reshape(4, 4, 3), np.zeros((1, 4, 3))])
+    joints = np.zeros((5, 4, 3))  # about which each angle turns: three times the root, the middle
+    for side in (0, 1):
+        joints[2 * side] = placement.arms[side][[0, 0, 0, 1]]
+        joints[2 * side + 1] = placement.legs[side][[0, 0, 0, 1]]
+    out = np.zeros((len(rows), 5, 4))
+    every = np.arange(len(rows))
+    for parts, points, sign in (
+        (FIRST[rows], contacts.near[rows], 1.0),
+        (SECOND[rows], contacts.far[rows], -1.0),
+    ):
+        group = _GROUP[parts]
+        # axis x (point - joint) . normal = axis . ((point - joint) x normal)
+        levers = np.cross(points[:, None] - joints[group], contacts.normals[rows][:, None])
+        speeds = np.einsum("rai,rai->ra", axes[group], levers) * _MOVES[parts]
+        out[every, group] += sign * speeds
+    return out[:, :4].reshape(len(rows), 16)
 
 
 def _axes(pose: Pose, placement: Placement) -> Float64[np.ndarray, "16 3"]:
@@ -169,8 +174,3 @@ def _axes(pose: Pose, placement: Placement) -> Float64[np.ndarray, "16 3"]:
         local = np.array([[-1.0, 0, 0], -swing[:, 1], chain[:, 2], chain[:, 0]])
         rows.append((local * mirror) @ placement.upright.T)
     return np.concatenate(rows)
-
-
-def touchable() -> Iterator[str]:
-    """Names of the parts that a pose's `touches` may pair."""
-    return iter(INDEX)
