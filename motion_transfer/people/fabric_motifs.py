@@ -163,11 +163,12 @@ def leaves(
     angle = rng.uniform(0, 2 * np.pi, column)
     length = scale / metres * rng.uniform(0.6, 1.1, column)
     shades = _picked(rng, colours, len(places), 0.3)
-    blades, ribs = (places + _turned(shape, angle, length) for shape in (outline, rib))
-    dark = _shaded(shades, -0.3)
-    for n in range(len(places)):
-        drawing.fill(blades[n : n + 1], shades[n : n + 1])
-        drawing.fill(ribs[n : n + 1], dark[n : n + 1])
+    # Each leaf, then its rib; a rib has as many corners, most of them the same one.
+    rib = np.pad(rib, ((0, len(outline) - len(rib)), (0, 0)), mode="edge")
+    both = np.stack([_turned(shape, angle, length) for shape in (outline, rib)], axis=1)
+    both += places[:, None]
+    inks = np.stack([shades, _shaded(shades, -0.3)], axis=1)
+    drawing.fill(both.reshape(-1, *outline.shape), inks.reshape(-1, 3))
     return drawing.repeat(metres)
 
 
@@ -184,10 +185,10 @@ def leopard(
     radius = (1 + 0.15 * lumps) * rng.uniform(0.28, 0.46, (count, 1)) / cells
     rings = _polar(radius, np.zeros((1, 1))) * rng.uniform(0.8, 1.2, (count, 1, 2))
     middle = colours[0] * 0.65 + colours[1] * 0.35
-    drawing.fill(places + rings * 0.85, np.broadcast_to(middle, (count, 3)))
-    points = 11
+    drawing.fill(places + rings[:, ::3] * 0.85, np.broadcast_to(middle, (count, 3)))
+    points = 8
     starts = rng.integers(steps, size=(count, 1)) + np.array([0, 13, 26])
-    along = (starts[..., None] + np.arange(points)) % steps
+    along = (starts[..., None] + np.arange(points) * 10 // 7) % steps
     arcs = rings[np.arange(count)[:, None, None], along]
     taper = np.sin(np.linspace(0.5, np.pi - 0.5, points))[:, None]
     thick = taper * rng.uniform(0.6, 1.2, (count, 3, 1, 1))
@@ -256,7 +257,7 @@ def camouflage(
     colours: Colours, scale: float, rng: np.random.Generator, texels_per_metre: float
 ) -> Repeat:
     """Overlapping blots about `scale` across."""
-    cells = 5
+    cells = 4
     metres = scale * cells
     side = span(metres, texels_per_metre)[1]
     cloth = _dyed(colours[0], side)

@@ -35,7 +35,8 @@ def lay(
 
     Args:
         angle: in radians; the pattern is turned clockwise about the panel's first corner.
-        start: where in the repeat that corner lies, as shares (0..1) of its width and height.
+        start: which point of the endless cloth (x, y in metres) lies at that corner. At a turn
+            other than a quarter it is met exactly, else to a texel.
     """
     quarters = round(angle / (np.pi / 2))
     angle -= quarters * np.pi / 2
@@ -45,6 +46,7 @@ def lay(
         size = size if quarters % 2 == 0 else size[::-1]
     across = pixels.shape[1] / (size[0] * texels_per_metre)
     down = pixels.shape[0] / (size[1] * texels_per_metre)
+    start = start / size % 1
     if abs(angle) < 1e-6:
         return _lay_straight(pixels, across, down, start, shape)
     return _lay_turned(pixels, across, down, angle, start, shape)

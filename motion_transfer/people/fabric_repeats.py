@@ -90,7 +90,7 @@ def _sampled(
     u = (np.arange(columns, dtype=np.float32) + 0.5) / np.float32(columns)
     v = (np.arange(rows, dtype=np.float32) + 0.5) / np.float32(rows)
     fine = table[np.broadcast_to(pick(u[None], v[:, None]), (rows, columns))]
-    if min(period) * texels_per_metre < 1:  # no texel can show it
+    if min(period) * texels_per_metre < 1:  # no texel can show it; spare the averaging
         mean = np.rint(fine.mean(axis=(0, 1))).astype(np.uint8)
         pixels = np.full((high, wide, 3), mean)
     else:

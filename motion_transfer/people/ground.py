@@ -31,7 +31,9 @@ def floor_shadow(points: Points, camera: Camera, light: Light) -> Float32[np.nda
     cast = _grid(fallen - middle, cells, 0.03 + 2 * light.softness_metres)
     contact = _grid(points[low, :2] - middle, cells, 0.03)
     share = sum(lamp.colour) / (sum(lamp.colour) + sum(light.sky))
-    taken = 1 - (1 - 0.9 * share * cast) * (1 - 0.75 * contact)
+    ring = np.linspace(-1, 1, cells, dtype=np.float32)
+    fade = np.clip(1.5 * (1 - np.hypot(ring, ring[:, None])), 0, 1)  # no edge where the grid ends
+    taken = 1 - (1 - 0.9 * share * cast * fade) * (1 - 0.75 * contact)
 
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32) * REACH_METRES
     corners[:, :2] += middle

@@ -89,8 +89,8 @@ def hang_piece(hair: Hair, head: Head, rest: PosedBody, limit: float | None = No
     roots, ways = ray_roots(part, angles, spread)
     release = until(roots, ways, _RELEASE)
     fringe = _fringe(hair, angles)
-    brow = until(roots, ways, 1.02 + 0.36 * hair.fringe)
-    brow = brow + 0.035 * rng.standard_normal(_COLUMNS)
+    brow = until(roots, ways, 1.02 + 0.30 * hair.fringe)
+    brow = brow + 0.022 * rng.standard_normal(_COLUMNS).clip(-2, 2)
     release = release + fringe * (np.minimum(brow, release) - release)
     rows = np.linspace(0, 1, _HUG, dtype=np.float32)[:, None]
     lengths = (rows * release).astype(np.float32)

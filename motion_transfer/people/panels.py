@@ -143,13 +143,14 @@ def _printed(panel: Panel, top: Top, at: Places, levels: Levels) -> None:
     if top.print is None or top.print_width <= 0:
         return
     texels = max(2, round(top.print_width * TEXELS_PER_METRE))
-    image = paint_print(top.print, texels, texels)
+    aspect = min(max(top.print.aspect, 0.15), 1.3)
+    image = paint_print(top.print, texels, max(2, round(texels * aspect)))
     upper = levels.armpit + 0.035 - max(0.0, top.neck_depth - 0.04)
-    outside = np.where((at.y > 0) == top.print_on_back, 0.0, 5.0).astype(np.float32)
+    wrong = (at.on_arm > 0.5) | ((at.y > 0) != top.print_on_back)
     sign = -1 if top.print_on_back else 1
-    across = np.float32(sign / top.print_width) * at.x + np.float32(0.5) + outside
-    down = (np.float32(upper) - at.z) * np.float32(1 / top.print_width)
-    panel.decal(image, across + 5 * (at.on_arm > 0.5), down)
+    across = np.float32(sign / top.print_width) * at.x + np.float32(0.5)
+    down = (np.float32(upper) - at.z) * np.float32(1 / (top.print_width * aspect))
+    panel.decal(image, across + wrong * np.float32(9), down)
 
 
 def _pockets(panel: Panel, top: Top, at: Places, levels: Levels) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -23,6 +23,9 @@ from motion_transfer.people.poses import Pose
 from motion_transfer.people.shade import Shading, shade
 
 FRAMING_SHARES: dict[Framing, float] = {"full": 0.6, "three-quarters": 0.25, "upper": 0.15}
+FRAMED_STEP = 5
+"""One in so many vertices is enough to point a camera by."""
+
 LENS_NOISE = 0.006
 """Sensor noise of a small photo, as a share of white."""
 
@@ -107,9 +110,11 @@ class Photographer:
         """Take a shot at a size of (width, height) px."""
         rng = np.random.default_rng(shot.seed)
         posed = dressed.posed(shot.pose)
+        points = [piece.posed(posed) for piece in dressed.pieces]
         lowest = lowest_in(posed.joints, self._model.skeleton, shot.framing)
+        shape = np.concatenate([p[::FRAMED_STEP] for p in points])
         camera = frame_points(
-            posed.points[posed.points[:, 2] >= lowest],
+            shape[shape[:, 2] >= lowest],
             size,
             distance=shot.distance,
             elevation=shot.elevation,
@@ -117,12 +122,13 @@ class Photographer:
             margin=shot.margin,
             shift=shot.shift,
         )
-        seen = shade(dressed.pieces, posed, camera, shot.light)
+        seen = shade(dressed.pieces, points, camera, shot.light)
         alpha = np.rint(seen.coverage * 255).astype(np.uint8)
+        background = replace(shot.background, camera_metres=max(float(camera.position[2]), 0.2))
         horizon = camera.height / 2 - camera.focal_px * np.tan(camera.elevation)
         pixels_per_metre = camera.focal_px / camera.distance
         behind = paint_background(
-            shot.background, camera.height, camera.width, float(horizon), pixels_per_metre
+            background, camera.height, camera.width, float(horizon), pixels_per_metre
         )
         if shot.background.has_floor:
             behind *= 1 - floor_shadow(posed.points, camera, shot.light)[..., None]

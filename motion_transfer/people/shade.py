@@ -13,7 +13,7 @@ from jaxtyping import Float32, UInt64
 from motion_transfer.people.body import Faces, Points
 from motion_transfer.people.camera import Camera
 from motion_transfer.people.light import Light
-from motion_transfer.people.mesh import Piece, PosedBody
+from motion_transfer.people.mesh import Piece
 from motion_transfer.people.rasterise import (
     EMPTY,
     Layer,
@@ -237,13 +237,13 @@ class Shading:
 
 
 def shade(
-    pieces: Sequence[Piece],
-    body: PosedBody,
-    camera: Camera,
-    light: Light | None,
+    pieces: Sequence[Piece], points: Sequence[Points], camera: Camera, light: Light | None
 ) -> Shading:
-    """Draw pieces; without a light, each shows its bare colour."""
-    points = [piece.posed(body) for piece in pieces]
+    """Draw pieces; without a light, each shows its bare colour.
+
+    Args:
+        points: of each piece, posed.
+    """
     fine = camera.scaled(SAMPLES)
     layers = [
         Layer(fine.project(p), piece.faces, piece.keep, cull=not piece.two_sided)

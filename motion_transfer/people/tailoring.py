@@ -41,13 +41,15 @@ def crease_tiles() -> np.ndarray:
     rng = np.random.default_rng(20)
     tiles = []
     for angle in (30, -35, 65, -60, 45, 85):
+        side = _TILE // 2  # the noise is drawn at a quarter of the scale: it is slow
         waves = np.zeros((_TILE, _TILE), np.float32)
         for along, across, gain in ((55, 11, 1.0), (30, 5, 0.3)):
-            noise = rng.normal(size=(_TILE * 2, _TILE * 2)).astype(np.float32)
-            noise = cv2.GaussianBlur(noise, (0, 0), sigmaX=along, sigmaY=across)
-            turn = cv2.getRotationMatrix2D((_TILE, _TILE), angle, 1)
-            noise = cv2.warpAffine(noise, turn, (2 * _TILE, 2 * _TILE))
-            noise = noise[_TILE // 2 : -_TILE // 2, _TILE // 2 : -_TILE // 2]
+            noise = rng.normal(size=(side, side)).astype(np.float32)
+            noise = cv2.GaussianBlur(noise, (0, 0), sigmaX=along / 4, sigmaY=across / 4)
+            turn = cv2.getRotationMatrix2D((side / 2, side / 2), angle, 1)
+            noise = cv2.warpAffine(noise, turn, (side, side))[side // 4 : -side // 4]
+            noise = noise[:, side // 4 : -side // 4]
+            noise = cv2.resize(noise, (_TILE, _TILE), interpolation=cv2.INTER_CUBIC)
             noise /= noise.std()
             waves += gain * (np.sqrt(noise**2 + 0.05) - 0.8)  # rounded ridges
         tiles.append(waves / waves.std())

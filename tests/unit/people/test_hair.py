@@ -218,12 +218,12 @@ def test_a_tail_starts_at_the_back_of_the_head_wherever_it_looks(body_model):
 def test_a_fringe_covers_the_forehead(body_model):
     body = body_model.template
     heights = []
-    for fringe in (0.0, 1.0):
+    for fringe in (0.0, 0.85):
         piece = hair_pieces(hair_of("long", fringe=fringe), body, body_model)[0]
         seen = piece.points[piece.keep > 0]
         ahead = seen[(np.abs(seen[:, 0]) < 0.03) & (seen[:, 1] < -0.10)]
         heights.append(float(ahead[:, 2].min()) if len(ahead) else np.inf)
-    assert 1.722 < heights[1] < 1.765 < heights[0]  # above the eyes
+    assert 1.712 < heights[1] < 1.765 < heights[0]  # its longest strand ends at the eyes
 
 
 def test_hats_hold_hair_down(body_model):

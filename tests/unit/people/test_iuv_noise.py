@@ -169,7 +169,8 @@ def test_a_shift_is_one_number_a_part(clean: np.ndarray) -> None:
     ],
 )
 def test_hands_forearms_and_feet_get_lost(clean, rates, missing: set, kept: set) -> None:
-    out = lose_parts(clean, *rates, np.random.default_rng(0))
+    hand, forearm, foot = rates
+    out = lose_parts(clean, hand, forearm, foot, np.random.default_rng(0))
     left = set(np.unique(out[..., 0]).tolist())
     assert not left & missing and kept <= left and is_valid(out)
 
@@ -230,7 +231,9 @@ def test_differences_are_what_they_say() -> None:
     first, second = np.zeros((2, 1, 4, 3), np.uint8)
     first[0, :3] = (1, 0, 0)
     second[0, 1:] = [(1, 51, 0), (2, 0, 0), (1, 0, 0)]
-    assert iuv_difference(first, second) == IuvDifference(0.5, 0.5, pytest.approx(0.2))
+    found = iuv_difference(first, second)
+    assert (found.iou, found.part_agreement) == (0.5, 0.5)
+    assert found.median_uv_error == pytest.approx(0.2)
     assert iuv_difference(first, first) == IuvDifference(1.0, 1.0, 0.0)
     nobody = iuv_difference(first * 0, first * 0)
     assert nobody.iou == 1 and np.isnan(nobody.part_agreement) and np.isnan(nobody.median_uv_error)

@@ -57,7 +57,7 @@ def differences(piece: Piece, dressed: DressedPerson, model, pose) -> np.ndarray
     """How far painting through the IUV is from drawing, per pixel inside parts, 0..1."""
     posed = dressed.posed(pose)
     camera = frame_points(posed.points, (256, 256), distance=3.0)
-    drawn = shade([piece], posed, camera, None)
+    drawn = shade([piece], [piece.posed(posed)], camera, None)
     iuv = render_iuv(posed.points, model.faces, load_charts(), camera)
     part, u, v = np.moveaxis(iuv.astype(int), 2, 0)
     painted = unfold(piece, model)[np.maximum(part, 1) - 1, v, u]

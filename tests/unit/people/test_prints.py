@@ -77,6 +77,13 @@ def test_letters_are_whole_and_centred(name):
     assert columns[0] == pytest.approx(159 - columns[-1], abs=4)
 
 
+def test_letters_below_the_line_are_not_cut_off():
+    alpha = paint_print(lettered("word", "HHyy"), 160, 80)[..., 3] > 0.5
+    columns = np.flatnonzero(alpha.any(axis=0))
+    lowest = [np.flatnonzero(alpha[:, part].any(axis=1))[-1] for part in np.split(columns, [40])]
+    assert lowest[1] > lowest[0] + 5
+
+
 def test_colour_is_not_multiplied_by_alpha():
     picture = paint_print(lettered("word", "NORVEN"), 160, 80)
     apart = np.abs(picture[..., :3] - np.array(INKS[0], np.float32)).max(axis=2)

@@ -10,18 +10,20 @@ from scipy.sparse import csr_array
 
 pytest.importorskip("warp", reason="needs the `people` extra")
 
-from motion_transfer.people.body import Body, Shape, Skeleton, SkinWeights  # noqa: E402
+from motion_transfer.people.body import SkinWeights  # noqa: E402
 from motion_transfer.people.camera import Camera  # noqa: E402
 from motion_transfer.people.light import Lamp, Light  # noqa: E402
-from motion_transfer.people.mesh import Material, Piece, PosedBody  # noqa: E402
-from motion_transfer.people.shade import SAMPLES, Shading, shade  # noqa: E402
+from motion_transfer.people.mesh import Material, Piece  # noqa: E402
+from motion_transfer.people import shade as shade_module  # noqa: E402
+from motion_transfer.people.shade import SAMPLES, Shading  # noqa: E402
 
 CAMERA = Camera(32, 32, 64.0, 4.0, (0.0, 0.0, 0.0))  # sees 2 x 2 m
 DARK = (0.0, 0.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
-SKELETON = Skeleton(("root",), (-1,))
-BODY = Body(Shape(), SKELETON, np.zeros((1, 3), np.float32), np.zeros((1, 3)))
-POSED = PosedBody(BODY, BODY.transforms({}), BODY.points, BODY.heads)
+
+
+def shade(pieces: list[Piece], camera: Camera, light: Light | None) -> Shading:
+    return shade_module.shade(pieces, [piece.points for piece in pieces], camera, light)
 
 
 def lamp(azimuth: float, elevation: float = 0.0) -> Light:
@@ -54,13 +56,13 @@ def middle(seen: Shading) -> np.ndarray:
 
 
 def test_without_light_a_surface_shows_its_own_colour():
-    seen = shade([plate()], POSED, CAMERA, None)
+    seen = shade([plate()], CAMERA, None)
     assert middle(seen) == pytest.approx([0.5, 0.25, 0.1], abs=1e-6)
     assert seen.colour[0, 0].tolist() == [0, 0, 0] and seen.coverage[0, 0] == 0
 
 
 def test_coverage_is_the_share_of_samples():
-    seen = shade([plate(half=0.83)], POSED, CAMERA, None)
+    seen = shade([plate(half=0.83)], CAMERA, None)
     steps = seen.coverage * SAMPLES**2
     assert steps == pytest.approx(np.rint(steps), abs=1e-5)
     assert seen.coverage.mean() == pytest.approx(0.83**2, abs=0.03)
@@ -70,20 +72,20 @@ def test_coverage_is_the_share_of_samples():
 def test_the_texture_lies_the_right_way_up():
     texture = np.zeros((8, 8, 4), np.float32)
     texture[:4, :, 0], texture[:, :4, 1] = 1, 1  # red above, green on the left
-    colour = shade([plate(texture=texture)], POSED, CAMERA, None).colour
+    colour = shade([plate(texture=texture)], CAMERA, None).colour
     assert colour[8, 20].tolist() == pytest.approx([1, 0, 0])
     assert colour[24, 10].tolist() == pytest.approx([0, 1, 0])
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
 def test_lambert(angle):
-    seen = shade([plate()], POSED, CAMERA, lamp(angle))
+    seen = shade([plate()], CAMERA, lamp(angle))
     assert middle(seen) == pytest.approx(np.cos(angle) * np.array([0.5, 0.25, 0.1]), rel=1e-3)
 
 
 def test_a_lamp_behind_gives_nothing_and_skin_lets_some_red_through():
-    assert middle(shade([plate()], POSED, CAMERA, lamp(1.8))).max() == 0
-    red, _, blue = middle(shade([plate(translucency=0.9)], POSED, CAMERA, lamp(1.8)))
+    assert middle(shade([plate()], CAMERA, lamp(1.8))).max() == 0
+    red, _, blue = middle(shade([plate(translucency=0.9)], CAMERA, lamp(1.8)))
     assert red > 0 and blue / red < 0.1 / 0.5
 
 
@@ -91,7 +93,7 @@ def test_what_stands_in_the_way_of_the_key_throws_a_shadow():
     screen = plate(half=0.3, y=-0.5)
     wall = plate()
     from_the_left = lamp(np.pi / 4)  # the lamp is at +x, so the shadow falls towards -x
-    seen = shade([wall, screen], POSED, CAMERA, from_the_left)
+    seen = shade([wall, screen], CAMERA, from_the_left)
     assert seen.colour[16, 8].max() < 0.05  # x = -0.5 of the wall
     assert seen.colour[16, 26] == pytest.approx(np.cos(np.pi / 4) * np.array([0.5, 0.25, 0.1]), rel=0.02)
 
@@ -99,8 +101,8 @@ def test_what_stands_in_the_way_of_the_key_throws_a_shadow():
 def test_gaps_are_darker_where_occlusion_is_asked_for():
     light = Light((Lamp(0, 0, DARK),), WHITE, WHITE, 0.01, 0.0)
     pieces = [plate(), plate(half=0.3, y=-0.1)]
-    open_air = shade(pieces, POSED, CAMERA, light).colour
-    closed = shade(pieces, POSED, CAMERA, replace(light, occlusion=1.0)).colour
+    open_air = shade(pieces, CAMERA, light).colour
+    closed = shade(pieces, CAMERA, replace(light, occlusion=1.0)).colour
     beside, far = (16, 10), (16, 4)  # on the wall, beside the small plate and away from it
     assert closed[beside][0] < 0.9 * open_air[beside][0]
     assert closed[far][0] == pytest.approx(open_air[far][0], rel=0.02)
@@ -110,7 +112,7 @@ def test_relief_turns_towards_the_light():
     texture = np.full((32, 32, 4), 0.5, np.float32)
     texture[..., 3] = 0.4 * np.linspace(0, 1.6, 32)  # rises to the right: faces the left
     left, right = (
-        middle(shade([plate(texture=texture)], POSED, CAMERA, lamp(angle)))[0]
+        middle(shade([plate(texture=texture)], CAMERA, lamp(angle)))[0]
         for angle in (-0.6, 0.6)
     )
     assert left > 1.5 * right
@@ -119,13 +121,13 @@ def test_relief_turns_towards_the_light():
 def test_the_inside_of_cloth_is_lit_on_its_own_side():
     cloth = plate()
     turned = replace(cloth, faces=cloth.faces[:, ::-1].copy(), corner_uv=cloth.corner_uv[:, ::-1])
-    assert shade([turned], POSED, CAMERA, lamp(0.0)).coverage.max() == 0
-    seen = shade([replace(turned, two_sided=True)], POSED, CAMERA, lamp(0.0))
+    assert shade([turned], CAMERA, lamp(0.0)).coverage.max() == 0
+    seen = shade([replace(turned, two_sided=True)], CAMERA, lamp(0.0))
     assert middle(seen) == pytest.approx([0.5, 0.25, 0.1], rel=1e-3)
 
 
 def test_gloss_shines_where_the_mirror_points():
-    straight = middle(shade([plate(gloss=0.3, sharpness=30)], POSED, CAMERA, lamp(0.0)))
-    aside = middle(shade([plate(gloss=0.3, sharpness=30)], POSED, CAMERA, lamp(1.0)))
+    straight = middle(shade([plate(gloss=0.3, sharpness=30)], CAMERA, lamp(0.0)))
+    aside = middle(shade([plate(gloss=0.3, sharpness=30)], CAMERA, lamp(1.0)))
     assert straight - [0.5, 0.25, 0.1] == pytest.approx([0.3] * 3, abs=0.02)
     assert aside - np.cos(1.0) * np.array([0.5, 0.25, 0.1]) == pytest.approx([0] * 3, abs=0.02)
