@@ -32,7 +32,7 @@ from motion_transfer.people.dataset import PeopleStream
 from motion_transfer.people.exact_iuv import render_iuv
 from motion_transfer.people.framing import frame_points
 
-STEPS = ("frame_points", "shade", "paint_background", "floor_shadow", "develop", "render_iuv")
+STEPS = ("frame_points", "paint_background", "floor_shadow", "develop", "render_iuv")
 
 
 @wp.kernel

@@ -8,7 +8,7 @@ from jaxtyping import Float32, UInt8
 from motion_transfer.people.body import Faces, Points
 from motion_transfer.people.camera import Camera
 from motion_transfer.people.charts import BodyCharts
-from motion_transfer.people.rasterise import Layer, rasterise, triangle_ids
+from motion_transfer.people.rasterise import Triangles, rasterise, triangle_ids
 
 
 def render_iuv(
@@ -22,7 +22,7 @@ def render_iuv(
     Returns: (I, U, V) at pixel centres; 0 where nobody is.
     """
     screen = camera.project(points)
-    nearest = rasterise([Layer(screen, faces)], camera.width, camera.height)
+    nearest = rasterise(screen, Triangles(faces), camera.width, camera.height)
     face = triangle_ids(nearest)
     pixel = np.flatnonzero(face >= 0)
     face = face[pixel]

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from motion_transfer.people.body import Faces, Points
-from motion_transfer.people.rasterise import Layer, rasterise, triangle_ids
+from motion_transfer.people.rasterise import Triangles, rasterise, triangle_ids
 
 IsCut = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Two arrays of triangles that share an edge -> whether a seam parts them."""
@@ -153,7 +153,7 @@ def flat_map(
     flat = charts.corner_uv.reshape(-1, 2) * texels_per_metre
     screen = np.concatenate([flat, np.ones((len(flat), 1), np.float32)], 1)
     loose = np.arange(len(flat), dtype=np.int32).reshape(-1, 3)
-    ids = triangle_ids(rasterise([Layer(screen, loose, cull=False)], width, height))
+    ids = triangle_ids(rasterise(screen, Triangles.two_sided(loose), width, height))
     out = np.zeros((height * width, values.shape[1]), np.float32)
     seen = np.nonzero(ids >= 0)[0]
     y, x = np.divmod(seen, width)

@@ -16,7 +16,7 @@ from jaxtyping import Float32
 from scipy.sparse import csr_array
 
 from motion_transfer.people.body import Body, BodyModel
-from motion_transfer.people.rasterise import Layer, rasterise, triangle_ids
+from motion_transfer.people.rasterise import Triangles, rasterise, triangle_ids
 from motion_transfer.people.skin_atlas import components
 
 MIDDLE = np.array([0.0, -0.045, 1.725], np.float32)  # of the template's head
@@ -136,8 +136,7 @@ def _chart(model: BodyModel) -> _Chart:
     screen = np.column_stack([pixel, 2 - radius]).astype(np.float32)
     # a triangle around the lowest direction would cover the whole map
     faces = faces[np.ptp(plane[faces], axis=1).max(1) < 1.0]
-    layer = Layer(screen, np.ascontiguousarray(faces), cull=False)
-    ids = triangle_ids(rasterise([layer], SIZE, SIZE))
+    ids = triangle_ids(rasterise(screen, Triangles.two_sided(faces), SIZE, SIZE))
     known = ids >= 0
     rows, columns, shares = [], [], []
     seen = np.flatnonzero(known)

@@ -18,6 +18,7 @@ from motion_transfer.people.mesh import Piece, PosedBody
 from motion_transfer.people.outfits import Outfit, sample_outfit
 from motion_transfer.people.poses import Pose
 from motion_transfer.people.posing import posed
+from motion_transfer.people.shade import Scene
 from motion_transfer.people.skin import skin_pieces
 from motion_transfer.people.surface import BodySurface
 from motion_transfer.people.untangling import untangled
@@ -80,6 +81,7 @@ class DressedPerson:
         person: the description.
         body: the bare body at rest.
         pieces: skin, garments, hair; the skin comes first.
+        scene: the pieces, ready to be drawn.
     """
 
     def __init__(self, person: Person, model: BodyModel) -> None:
@@ -96,6 +98,7 @@ class DressedPerson:
             *dressed.pieces,
             *hair_pieces(person.hair, self.body, model),
         ]
+        self.scene = Scene(self.pieces)
 
     def posed(self, pose: Pose) -> PosedBody:
         """The body in a pose, on the floor; limbs that would go through it are moved aside."""

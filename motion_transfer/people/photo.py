@@ -20,7 +20,7 @@ from motion_transfer.people.light import Light, sample_light
 from motion_transfer.people.person import DressedPerson
 from motion_transfer.people.pose_sampler import sample_pose
 from motion_transfer.people.poses import Pose
-from motion_transfer.people.shade import Shading, shade
+from motion_transfer.people.shade import Shading
 
 FRAMING_SHARES: dict[Framing, float] = {"full": 0.6, "three-quarters": 0.25, "upper": 0.15}
 FRAMED_STEP = 5
@@ -110,11 +110,11 @@ class Photographer:
         """Take a shot at a size of (width, height) px."""
         rng = np.random.default_rng(shot.seed)
         posed = dressed.posed(shot.pose)
-        points = [piece.posed(posed) for piece in dressed.pieces]
+        points = np.concatenate([piece.posed(posed) for piece in dressed.pieces])
         lowest = lowest_in(posed.joints, self._model.skeleton, shot.framing)
-        shape = np.concatenate([p[::FRAMED_STEP] for p in points])
+        outline = points[::FRAMED_STEP]
         camera = frame_points(
-            shape[shape[:, 2] >= lowest],
+            outline[outline[:, 2] >= lowest],
             size,
             distance=shot.distance,
             elevation=shot.elevation,
@@ -122,7 +122,7 @@ class Photographer:
             margin=shot.margin,
             shift=shot.shift,
         )
-        seen = shade(dressed.pieces, points, camera, shot.light)
+        seen = dressed.scene.shade(points, camera, shot.light)
         alpha = np.rint(seen.coverage * 255).astype(np.uint8)
         background = replace(shot.background, camera_metres=max(float(camera.position[2]), 0.2))
         horizon = camera.height / 2 - camera.focal_px * np.tan(camera.elevation)

@@ -5,12 +5,12 @@ Kernels are compiled by `warp` on first use (seconds, then kept on disk).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import warp as wp
-from jaxtyping import Float32, Int32, UInt64
+from jaxtyping import Float32, Int32, UInt8, UInt64
 
 from motion_transfer.people.body import Faces
 from motion_transfer.people.extra import start_warp
@@ -21,20 +21,35 @@ EMPTY = np.uint64(0xFFFFFFFFFFFFFFFF)
 
 
 @dataclass(frozen=True)
-class Layer:
-    """Triangles on the picture plane.
+class Triangles:
+    """What is drawn, but for where it lies.
 
     Attributes:
-        screen: V x 3: pixel x, pixel y, depth (> 0 in front of the camera).
         faces: triangles.
-        keep: V, or None for everything: fragments where its interpolation is < 0 are left out.
-        cull: leave out triangles seen from behind.
+        keep: of each vertex; fragments where its interpolation is < 0 are left out. None: all stay.
+        cull: of each triangle: 1 leaves it out when it is seen from behind. None: all of them.
     """
 
-    screen: Float32[np.ndarray, "V 3"]
     faces: Faces
     keep: Float32[np.ndarray, " V"] | None = None
-    cull: bool = True
+    cull: UInt8[np.ndarray, " F"] | None = None
+
+    @classmethod
+    def two_sided(cls, faces: Faces, keep: Float32[np.ndarray, " V"] | None = None) -> Triangles:
+        """Seen from both sides."""
+        return cls(np.ascontiguousarray(faces), keep, np.zeros(len(faces), np.uint8))
+
+    @cached_property
+    def arrays(self) -> tuple[wp.array, wp.array, wp.array]:
+        """The same for kernels, shared with NumPy."""
+        vertices = int(self.faces.max()) + 1 if len(self.faces) else 0
+        keep = np.ones(vertices, np.float32) if self.keep is None else self.keep
+        cull = np.ones(len(self.faces), np.uint8) if self.cull is None else self.cull
+        return (
+            share_array(self.faces, wp.vec3i),
+            share_array(keep, wp.float32),
+            share_array(cull, wp.uint8),
+        )
 
 
 @wp.kernel(enable_backward=False)
@@ -42,8 +57,7 @@ def _fill(
     screen: wp.array(dtype=wp.vec3),
     faces: wp.array(dtype=wp.vec3i),
     keep: wp.array(dtype=wp.float32),
-    cull: wp.int32,
-    first_id: wp.int32,
+    cull: wp.array(dtype=wp.uint8),
     width: wp.int32,
     height: wp.int32,
     nearest: wp.array(dtype=wp.uint64),
@@ -55,7 +69,7 @@ def _fill(
         return
     # twice the signed area; y points down, so outward (counter-clockwise) faces are negative
     area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-    if area == 0.0 or (cull != 0 and area > 0.0):
+    if area == 0.0 or (area > 0.0 and cull[f] != wp.uint8(0)):
         return
     ka, kb, kc = keep[corners[0]], keep[corners[1]], keep[corners[2]]
     if ka < 0.0 and kb < 0.0 and kc < 0.0:
@@ -77,33 +91,23 @@ def _fill(
                     z = 1.0 / (wa * ia + wb * ib + wc * ic)
                     # positive floats sort as their bits do: depth above, triangle below
                     bits = wp.uint64(wp.cast(z, wp.uint32))
-                    packed = (bits << wp.uint64(32)) | wp.uint64(first_id + f)
+                    packed = (bits << wp.uint64(32)) | wp.uint64(f)
                     wp.atomic_min(nearest, y * width + x, packed)
 
 
-def rasterise(layers: Sequence[Layer], width: int, height: int) -> UInt64[np.ndarray, " H*W"]:
+def rasterise(
+    screen: Float32[np.ndarray, "V 3"], triangles: Triangles, width: int, height: int
+) -> UInt64[np.ndarray, " H*W"]:
     """Which triangle each pixel centre sees first.
 
-    Triangles are numbered through all layers in their order.
-
+    Args:
+        screen: vertices as pixel x, pixel y, depth (> 0 in front of the camera).
     Returns: H * W values, row by row: the bits of the float32 depth above 32 bits of the triangle's
-    number; all ones where nothing is seen. `triangle_ids` and `depths` take them apart.
+        number; all ones where nothing is seen. `triangle_ids` and `depths` take them apart.
     """
     nearest = wp.full(width * height, wp.uint64(EMPTY), dtype=wp.uint64, device="cpu")
-    first_id = 0
-    for layer in layers:
-        keep = np.ones(len(layer.screen), np.float32) if layer.keep is None else layer.keep
-        inputs = [
-            share_array(layer.screen, wp.vec3),
-            share_array(layer.faces, wp.vec3i),
-            share_array(keep, wp.float32),
-            int(layer.cull),
-            first_id,
-            width,
-            height,
-        ]
-        wp.launch(_fill, len(layer.faces), inputs=inputs, outputs=[nearest], device="cpu")
-        first_id += len(layer.faces)
+    inputs = [share_array(screen, wp.vec3), *triangles.arrays, width, height]
+    wp.launch(_fill, len(triangles.faces), inputs=inputs, outputs=[nearest], device="cpu")
     return nearest.numpy()
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import warp as wp
 from jaxtyping import Float32, UInt64
 
-from motion_transfer.people.body import Faces, Points
+from motion_transfer.people.body import Points
 from motion_transfer.people.camera import Camera
 from motion_transfer.people.light import Light
 from motion_transfer.people.mesh import Piece
 from motion_transfer.people.rasterise import (
     EMPTY,
-    Layer,
+    Triangles,
     depths,
     rasterise,
     share_array,
@@ -69,6 +69,10 @@ class LightInput:
 
 @wp.struct
 class MaterialInput:
+    first_texel: wp.int32
+    height: wp.int32
+    width: wp.int32
+    relief: wp.int32
     size: wp.vec2
     gloss: wp.float32
     sharpness: wp.float32
@@ -91,21 +95,22 @@ def _add_normals(
 
 
 @wp.func
-def _texel(texture: wp.array2d(dtype=wp.vec4), u: float, v: float):
+def _texel(texture: wp.array(dtype=wp.vec4), material: MaterialInput, u: float, v: float):
     """Bilinear; repeats along u, clamps along v."""
-    height, width = texture.shape[0], texture.shape[1]
+    height, width = material.height, material.width
     x = (u - wp.floor(u)) * float(width) - 0.5
     y = wp.clamp(v * float(height) - 0.5, 0.0, float(height - 1))
     x0, y0 = int(wp.floor(x)), int(wp.floor(y))
     fx, fy = x - float(x0), y - float(y0)
-    y1 = wp.min(y0 + 1, height - 1)
+    upper = material.first_texel + y0 * width
+    lower = material.first_texel + wp.min(y0 + 1, height - 1) * width
     x1 = x0 + 1
     if x0 < 0:
         x0 = width - 1
     if x1 >= width:
         x1 = 0
-    top = texture[y0, x0] * (1.0 - fx) + texture[y0, x1] * fx
-    bottom = texture[y1, x0] * (1.0 - fx) + texture[y1, x1] * fx
+    top = texture[upper + x0] * (1.0 - fx) + texture[upper + x1] * fx
+    bottom = texture[lower + x0] * (1.0 - fx) + texture[lower + x1] * fx
     return top * (1.0 - fy) + bottom * fy
 
 
@@ -136,8 +141,9 @@ def _shade(
     normals: wp.array(dtype=wp.vec3),
     faces: wp.array(dtype=wp.vec3i),
     corner_uv: wp.array2d(dtype=wp.vec2),
-    texture: wp.array2d(dtype=wp.vec4),
-    material: MaterialInput,
+    piece: wp.array(dtype=wp.uint8),
+    materials: wp.array(dtype=MaterialInput),
+    texture: wp.array(dtype=wp.vec4),
     light: LightInput,
     shadow: wp.array2d(dtype=wp.float32),
     openness: wp.array2d(dtype=wp.float32),
@@ -164,7 +170,8 @@ def _shade(
 
     ta, tb, tc = corner_uv[face, 0], corner_uv[face, 1], corner_uv[face, 2]
     uv = ta * wa + tb * wb + tc * wc
-    texel = _texel(texture, uv[0], uv[1])
+    material = materials[int(piece[face])]
+    texel = _texel(texture, material, uv[0], uv[1])
     albedo = wp.vec3(texel[0], texel[1], texel[2])
     result = albedo
     if light.lit != 0:
@@ -185,10 +192,13 @@ def _shade(
         if wp.abs(det) > 1.0e-9:
             along_u = wp.normalize((e1 * d2[1] - e2 * d1[1]) / det)
             along_v = wp.normalize((e2 * d1[0] - e1 * d2[0]) / det)
-            du, dv = 1.0 / float(texture.shape[1]), 1.0 / float(texture.shape[0])
-            slope_u = (_texel(texture, uv[0] + du, uv[1])[3] - texel[3]) / (du * material.size[0])
-            slope_v = (_texel(texture, uv[0], uv[1] + dv)[3] - texel[3]) / (dv * material.size[1])
-            normal = wp.normalize(normal - along_u * slope_u - along_v * slope_v)
+            if material.relief != 0:
+                du, dv = 1.0 / float(material.width), 1.0 / float(material.height)
+                right = _texel(texture, material, uv[0] + du, uv[1])
+                below = _texel(texture, material, uv[0], uv[1] + dv)
+                slope_u = (right[3] - texel[3]) / (du * material.size[0])
+                slope_v = (below[3] - texel[3]) / (dv * material.size[1])
+                normal = wp.normalize(normal - along_u * slope_u - along_v * slope_v)
 
         # turned by a different angle at every sample, so that 8 taps make no bands
         spin = 6.2831853 * wp.frac(0.7548777 * float(column) + 0.5698403 * float(row))
@@ -236,69 +246,90 @@ class Shading:
     coverage: Float32[np.ndarray, "H W"]
 
 
-def shade(
-    pieces: Sequence[Piece], points: Sequence[Points], camera: Camera, light: Light | None
-) -> Shading:
-    """Draw pieces; without a light, each shows its bare colour.
+class Scene:
+    """Pieces joined, once for any number of pictures of them.
 
-    Args:
-        points: of each piece, posed.
+    Attributes:
+        triangles: of all pieces, vertices and faces numbered through.
     """
-    fine = camera.scaled(SAMPLES)
-    layers = [
-        Layer(fine.project(p), piece.faces, piece.keep, cull=not piece.two_sided)
-        for piece, p in zip(pieces, points, strict=True)
-    ]
-    nearest = rasterise(layers, fine.width, fine.height)
-    shadow_map, lamp = _light_input(light, camera, pieces, points)
-    openness = _openness(nearest, fine, light)
-    out = wp.zeros((camera.height, camera.width), dtype=wp.vec4, device="cpu")
-    sample = np.flatnonzero(nearest != EMPTY).astype(np.int32)
-    face = triangle_ids(nearest[sample])
-    first_id = 0
-    for piece, layer, moved in zip(pieces, layers, points, strict=True):
-        own = np.flatnonzero((face >= first_id) & (face < first_id + len(piece.faces)))
+
+    def __init__(self, pieces: Sequence[Piece]) -> None:
+        counts = [len(piece.points) for piece in pieces]
+        first = np.cumsum([0, *counts], dtype=np.int32)
+        self.triangles = Triangles(
+            np.concatenate([piece.faces + n for piece, n in zip(pieces, first, strict=False)]),
+            np.concatenate([piece.keep for piece in pieces]).astype(np.float32),
+            np.repeat([not piece.two_sided for piece in pieces], faces := _faces(pieces)).astype(
+                np.uint8
+            ),
+        )
+        textures = [piece.material.texture.reshape(-1, 4) for piece in pieces]
+        texels = np.cumsum([0, *(len(texture) for texture in textures)])
+        materials = [_material(p, int(n)) for p, n in zip(pieces, texels, strict=False)]
+        self._arrays = (
+            share_array(np.concatenate([piece.corner_uv for piece in pieces]), wp.vec2),
+            share_array(np.repeat(np.arange(len(pieces), dtype=np.uint8), faces), wp.uint8),
+            wp.array(materials, dtype=MaterialInput, device="cpu"),
+            share_array(np.concatenate(textures), wp.vec4),
+        )
+
+    def shade(self, points: Points, camera: Camera, light: Light | None) -> Shading:
+        """Draw the pieces; without a light, each shows its bare colour.
+
+        Args:
+            points: of all pieces in their order, posed.
+        """
+        fine = camera.scaled(SAMPLES)
+        screen = fine.project(points)
+        nearest = rasterise(screen, self.triangles, fine.width, fine.height)
+        shadow_map, lamp = _light_input(light, camera, self.triangles, points)
+        sample = np.flatnonzero(nearest != EMPTY).astype(np.int32)
+        out = wp.zeros((camera.height, camera.width), dtype=wp.vec4, device="cpu")
         inputs = [
-            share_array(sample[own], wp.int32),
-            share_array(face[own] - np.int32(first_id), wp.int32),
-            share_array(layer.screen, wp.vec3),
-            share_array(moved, wp.vec3),
-            share_array(vertex_normals(moved, piece.faces), wp.vec3),
-            share_array(piece.faces, wp.vec3i),
-            share_array(piece.corner_uv, wp.vec2),
-            share_array(piece.material.texture, wp.vec4),
-            _material_input(piece),
+            share_array(sample, wp.int32),
+            share_array(triangle_ids(nearest[sample]), wp.int32),
+            share_array(screen, wp.vec3),
+            share_array(points, wp.vec3),
+            share_array(vertex_normals(points, self.triangles), wp.vec3),
+            self.triangles.arrays[0],
+            *self._arrays,
             lamp,
             share_array(shadow_map, wp.float32),
-            share_array(openness, wp.float32),
+            share_array(_openness(nearest, fine, light), wp.float32),
             SAMPLES,
         ]
-        wp.launch(_shade, len(own), inputs=inputs, outputs=[out], device="cpu")
-        first_id += len(piece.faces)
-    rgba = out.numpy()
-    return Shading(rgba[..., :3], rgba[..., 3])
+        wp.launch(_shade, len(sample), inputs=inputs, outputs=[out], device="cpu")
+        rgba = out.numpy()
+        return Shading(rgba[..., :3], rgba[..., 3])
 
 
-def vertex_normals(points: Points, faces: Faces) -> Float32[np.ndarray, "V 3"]:
+def vertex_normals(points: Points, triangles: Triangles) -> Float32[np.ndarray, "V 3"]:
     """Sums of the normals of the triangles around each vertex, weighted by area; not unit."""
     normals = wp.zeros(len(points), dtype=wp.vec3, device="cpu")
-    inputs = [share_array(points, wp.vec3), share_array(faces, wp.vec3i)]
-    wp.launch(_add_normals, len(faces), inputs=inputs, outputs=[normals], device="cpu")
+    inputs = [share_array(points, wp.vec3), triangles.arrays[0]]
+    wp.launch(_add_normals, len(triangles.faces), inputs=inputs, outputs=[normals], device="cpu")
     return normals.numpy()
 
 
-def _material_input(piece: Piece) -> MaterialInput:
-    made = MaterialInput()
-    made.size = wp.vec2(*piece.material.size_metres)
-    made.gloss = piece.material.gloss
-    made.sharpness = piece.material.sharpness
-    made.translucency = piece.material.translucency
-    made.sheen_along_v = int(piece.material.sheen_along_v)
+def _faces(pieces: Sequence[Piece]) -> list[int]:
+    return [len(piece.faces) for piece in pieces]
+
+
+def _material(piece: Piece, first_texel: int) -> MaterialInput:
+    material, made = piece.material, MaterialInput()
+    made.first_texel = first_texel
+    made.height, made.width = material.texture.shape[:2]
+    made.relief = int(np.ptp(material.texture[..., 3]) > 0)
+    made.size = wp.vec2(*material.size_metres)
+    made.gloss = material.gloss
+    made.sharpness = material.sharpness
+    made.translucency = material.translucency
+    made.sheen_along_v = int(material.sheen_along_v)
     return made
 
 
 def _light_input(
-    light: Light | None, camera: Camera, pieces: Sequence[Piece], points: Sequence[Points]
+    light: Light | None, camera: Camera, triangles: Triangles, points: Points
 ) -> tuple[Float32[np.ndarray, "S S"], LightInput]:
     """The shadow map (depth from the key lamp) and everything that shading needs of the light."""
     made = LightInput()
@@ -316,22 +347,19 @@ def _light_input(
     rows = shadow_rows(light, points)
     made.shadow_x, made.shadow_y, made.shadow_z = (wp.vec4(*row) for row in rows)
     made.softness_px = light.softness_metres * float(np.linalg.norm(rows[0, :3]))
-    layers = [
-        Layer(p @ rows[:, :3].T + rows[:, 3], piece.faces, piece.keep, cull=False)
-        for piece, p in zip(pieces, points, strict=True)
-    ]
-    seen = rasterise(layers, SHADOW_SIZE, SHADOW_SIZE)
+    placed = points @ rows[:, :3].T + rows[:, 3]
+    seen = rasterise(placed, triangles, SHADOW_SIZE, SHADOW_SIZE)
     shadow = np.where(seen == EMPTY, np.float32(1e9), depths(seen))
     return shadow.reshape(SHADOW_SIZE, SHADOW_SIZE), made
 
 
-def shadow_rows(light: Light, points: Sequence[Points]) -> Float32[np.ndarray, "3 4"]:
+def shadow_rows(light: Light, points: Points) -> Float32[np.ndarray, "3 4"]:
     """Rows that take (x, y, z, 1) to shadow-map column, row and depth from the key lamp."""
     into = -np.array(light.lamps[0].toward)
     right = np.cross([0.0, 0.0, 1.0], into)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(into, right), into])
-    placed = np.concatenate([p[:: 8 if len(p) > 1000 else 1] for p in points]) @ axes.T
+    placed = points[:: 8 if len(points) > 1000 else 1] @ axes.T
     low, high = placed.min(0), placed.max(0)
     scale = 0.94 * SHADOW_SIZE / max(float((high - low)[:2].max()), 1e-3)
     middle = (low + high) / 2

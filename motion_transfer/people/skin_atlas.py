@@ -18,7 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from motion_transfer.people.body import BodyModel, Faces, Points
-from motion_transfer.people.rasterise import Layer, rasterise, triangle_ids
+from motion_transfer.people.rasterise import Triangles, rasterise, triangle_ids
 
 WIDTH, HEAD_ROWS, STRIP_ROWS = 448, 256, 32
 AXIS_Y = -0.05  # of the head's vertical axis; x is 0
@@ -188,8 +188,7 @@ def _places(
     faces = np.concatenate([skin, eyes])
     wraps = np.ptp(u[faces], axis=1) > 0.5
     faces, is_eye = faces[~wraps], (np.arange(len(faces)) >= len(skin))[~wraps]
-    layer = Layer(chart, np.ascontiguousarray(faces), cull=False)
-    ids = triangle_ids(rasterise([layer], WIDTH, HEAD_ROWS)).reshape(HEAD_ROWS, WIDTH)
+    ids = triangle_ids(rasterise(chart, Triangles.two_sided(faces), WIDTH, HEAD_ROWS)).reshape(HEAD_ROWS, WIDTH)
     place = points[faces[ids]].mean(2)
     # triangles are millimetres in the face: their middles, blurred, are near enough
     known = (ids >= 0).astype(np.float32)

@@ -18,8 +18,8 @@ from motion_transfer.people.framing import frame_points  # noqa: E402
 from motion_transfer.people.mesh import Material, Piece  # noqa: E402
 from motion_transfer.people.person import DressedPerson, sample_person  # noqa: E402
 from motion_transfer.people.pose_sampler import sample_pose  # noqa: E402
-from motion_transfer.people.rasterise import Layer, rasterise, triangle_ids  # noqa: E402
-from motion_transfer.people.shade import shade  # noqa: E402
+from motion_transfer.people.rasterise import Triangles, rasterise, triangle_ids  # noqa: E402
+from motion_transfer.people.shade import Scene  # noqa: E402
 
 TILE = 256
 
@@ -45,7 +45,7 @@ def unfold(piece: Piece, model) -> np.ndarray:
         flat = np.ones((len(own) * 3, 3), np.float32)
         flat[:, :2] = charts.uv[ours[own]].reshape(-1, 2) * (TILE - 1) + 0.5
         corners = np.arange(len(flat), dtype=np.int32).reshape(-1, 3)
-        face = triangle_ids(rasterise([Layer(flat, corners, cull=False)], TILE, TILE))
+        face = triangle_ids(rasterise(flat, Triangles.two_sided(corners), TILE, TILE))
         pixel = np.flatnonzero(face >= 0)
         weights = barycentric(flat[corners[face[pixel]]], pixel, TILE)
         uv = np.einsum("pk,pkc->pc", weights, piece.corner_uv[own[face[pixel]]])
@@ -57,7 +57,7 @@ def differences(piece: Piece, dressed: DressedPerson, model, pose) -> np.ndarray
     """How far painting through the IUV is from drawing, per pixel inside parts, 0..1."""
     posed = dressed.posed(pose)
     camera = frame_points(posed.points, (256, 256), distance=3.0)
-    drawn = shade([piece], [piece.posed(posed)], camera, None)
+    drawn = Scene([piece]).shade(piece.posed(posed), camera, None)
     iuv = render_iuv(posed.points, model.faces, load_charts(), camera)
     part, u, v = np.moveaxis(iuv.astype(int), 2, 0)
     painted = unfold(piece, model)[np.maximum(part, 1) - 1, v, u]

@@ -14,8 +14,7 @@ from motion_transfer.people.body import SkinWeights  # noqa: E402
 from motion_transfer.people.camera import Camera  # noqa: E402
 from motion_transfer.people.light import Lamp, Light  # noqa: E402
 from motion_transfer.people.mesh import Material, Piece  # noqa: E402
-from motion_transfer.people import shade as shade_module  # noqa: E402
-from motion_transfer.people.shade import SAMPLES, Shading  # noqa: E402
+from motion_transfer.people.shade import SAMPLES, Scene, Shading  # noqa: E402
 
 CAMERA = Camera(32, 32, 64.0, 4.0, (0.0, 0.0, 0.0))  # sees 2 x 2 m
 DARK = (0.0, 0.0, 0.0)
@@ -23,7 +22,8 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 def shade(pieces: list[Piece], camera: Camera, light: Light | None) -> Shading:
-    return shade_module.shade(pieces, [piece.points for piece in pieces], camera, light)
+    points = np.concatenate([piece.points for piece in pieces])
+    return Scene(pieces).shade(points, camera, light)
 
 
 def lamp(azimuth: float, elevation: float = 0.0) -> Light:
