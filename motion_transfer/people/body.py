@@ -184,9 +184,9 @@ class BodyModel:
         numbers = {name: torch.tensor([value]) for name, value in asdict(shape).items()}
         with one_thread(), torch.no_grad():
             coefficients = self._anny.get_phenotype_blendshape_coefficients(**numbers)
-            rest = self._anny.get_rest_model(coefficients)
-        points = rest["rest_vertices"][0].numpy()
-        heads = rest["rest_bone_heads"][0].numpy().astype(np.float64)
+            points = self._anny.get_rest_vertices(coefficients)[0].numpy()
+            shift = torch.einsum("a,abi->bi", coefficients[0], self._anny.bone_heads_blendshapes)
+            heads = (self._anny.template_bone_heads + shift).numpy().astype(np.float64)
         floor = np.array([0, 0, points[:, 2].min()], np.float32)
         return Body(shape, self.skeleton, points - floor, heads - floor)
 

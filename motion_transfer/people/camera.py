@@ -40,7 +40,7 @@ class Camera:
         ce, se = np.cos(self.elevation), np.sin(self.elevation)
         into = np.array([-sa * ce, ca * ce, -se])
         right = np.array([ca, sa, 0.0])
-        down = np.cross(into, right)
+        down = np.array([sa * se, -ca * se, -ce])  # into x right
         cr, sr = np.cos(self.roll), np.sin(self.roll)
         return np.stack([cr * right - sr * down, cr * down + sr * right, into])
 

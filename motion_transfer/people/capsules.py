@@ -35,6 +35,9 @@ TORSO_BONES = ("root", "spine04", "spine02", "spine01")
 LIMBS = ("upperarm", "forearm", "hand", "thigh", "shin", "foot")
 PARTS = (*TORSO, "head", *(f"{limb}.{side}" for side in "LR" for limb in LIMBS))
 INDEX = {part: i for i, part in enumerate(PARTS)}
+MEASURED_STEP = 3
+"""One in so many vertices is enough to take a limb's measure."""
+
 TOUCHING = 0.01
 """How far parts may sink into each other, metres: skin gives way where a hand rests on it."""
 
@@ -277,7 +280,7 @@ def _skin_parts(model: BodyModel) -> dict[str, np.ndarray]:
     trunk = ("spine", "pelvis", "upperleg01", "root")
     parts["trunk"] = [i for i, name in enumerate(names) if name.startswith(trunk)]
     parts["head"] = [i for i, name in enumerate(names) if name == "head"]
-    return {part: np.array(index) for part, index in parts.items()}
+    return {part: np.array(index[::MEASURED_STEP]) for part, index in parts.items()}
 
 
 def _radii(skin: Points, start: np.ndarray, end: np.ndarray) -> tuple[float, float]:

@@ -132,27 +132,33 @@ class Photographer:
         )
         if shot.background.has_floor:
             behind *= 1 - floor_shadow(posed.points, camera, shot.light)[..., None]
-        rgb = develop(composite(seen, behind), shot.grain, rng)
+        rgb = develop(seen, behind, shot.grain, rng)
         iuv = render_iuv(posed.points, self._model.faces, self._charts, camera)
         if noise is not None:
             iuv = add_iuv_noise(iuv, noise, rng)
         return PersonPhoto(rgb, alpha, iuv, camera)
 
 
-def composite(seen: Shading, behind: Float32[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"]:
-    """The person in front of a background, both linear."""
-    return seen.colour + behind * (1 - seen.coverage[..., None])
-
-
 def develop(
-    linear: Float32[np.ndarray, "H W 3"], grain: float, rng: np.random.Generator
+    seen: Shading,
+    behind: Float32[np.ndarray, "H W 3"],
+    grain: float,
+    rng: np.random.Generator,
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """Linear light as 8-bit sRGB, with sensor noise; what is too bright rolls off softly."""
-    index = np.clip(linear * (len(_TONE) - 1) / TONE_RANGE, 0, len(_TONE) - 1).astype(np.uint16)
-    tone = _TONE[index]
+    """The person in front of a background as 8-bit sRGB; what is too bright rolls off softly.
+
+    Args:
+        behind: linear RGB.
+        grain: sensor noise, standard deviation as a share of white.
+    """
+    linear = seen.colour + behind * (1 - seen.coverage[..., None])
+    np.minimum(linear, TONE_RANGE, out=linear)
+    linear *= (len(_TONE) - 1) / TONE_RANGE
+    tone = np.take(_TONE, linear.astype(np.int32))
     if grain > 0:
         tone += rng.standard_normal(tone.shape[:2], np.float32)[..., None] * (255 * grain)
-    return np.clip(np.rint(tone), 0, 255).astype(np.uint8)
+        np.clip(tone, 0, 255, out=tone)
+    return (tone + 0.5).astype(np.uint8)
 
 
 TONE_RANGE = 2.0
