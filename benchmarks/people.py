@@ -26,11 +26,11 @@ import torch
 import warp as wp
 
 from motion_transfer.people import photo as photo_module
-from motion_transfer.people.body import load_body_model
-from motion_transfer.people.charts import load_charts
 from motion_transfer.people.dataset import PeopleStream
-from motion_transfer.people.exact_iuv import render_iuv
-from motion_transfer.people.framing import frame_points
+from motion_transfer.people.figure.body import load_body_model
+from motion_transfer.people.figure.charts import load_charts
+from motion_transfer.people.figure.exact_iuv import render_iuv
+from motion_transfer.people.figure.framing import frame_points
 
 STEPS = ("frame_points", "paint_background", "floor_shadow", "develop", "render_iuv")
 
@@ -125,8 +125,10 @@ def images(size: int, people: int, rounds: int) -> None:
     )
     for name, seconds in sorted(times.items(), key=lambda item: -sum(item[1])):
         share = sum(seconds) / (2 * people * rounds)
-        print(f"  {name}: median {statistics.median(seconds) * 1e3:.1f} ms,"
-              f" {share * 1e3:.1f} ms an image")
+        print(
+            f"  {name}: median {statistics.median(seconds) * 1e3:.1f} ms,"
+            f" {share * 1e3:.1f} ms an image"
+        )
 
 
 def rasteriser(size: int, rounds: int) -> None:

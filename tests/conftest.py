@@ -19,7 +19,7 @@ from PIL import Image
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch: images are tiny, cores are shared
 
-PREPARE_BODY = "from motion_transfer.people.body import load_body_model; load_body_model()"
+PREPARE_BODY = "from motion_transfer.people.figure.body import load_body_model; load_body_model()"
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -42,7 +42,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def body_model():
     """The parametric body; skipped, with the reason, where the extra is not installed."""
     pytest.importorskip("anny", reason="needs the `people` extra")
-    from motion_transfer.people.body import load_body_model
+    from motion_transfer.people.figure.body import load_body_model
 
     return load_body_model()
 

