@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib.util import find_spec
 from pathlib import Path
 
 import av
@@ -15,6 +18,34 @@ import pytest
 from PIL import Image
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch: images are tiny, cores are shared
+
+PREPARE_BODY = "from motion_transfer.people.figure.body import load_body_model; load_body_model()"
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Start what takes minutes on a fresh machine, so that it is done when it is needed.
+
+    The process goes on by itself; a test that comes too early waits for it (a lock sees to that).
+    """
+    is_worker = hasattr(session.config, "workerinput")
+    cache = Path(os.environ.get("ANNY_CACHE_DIR", Path.home() / ".cache" / "anny"))
+    if not is_worker and find_spec("anny") and not any(cache.glob("v*/build_compact*")):
+        subprocess.Popen([sys.executable, "-c", PREPARE_BODY], stderr=subprocess.DEVNULL)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that need the body model come last."""
+    items.sort(key=lambda item: "body_model" in getattr(item, "fixturenames", ()))
+
+
+@pytest.fixture(scope="session")
+def body_model():
+    """The parametric body; skipped, with the reason, where the extra is not installed."""
+    pytest.importorskip("anny", reason="needs the `people` extra")
+    from motion_transfer.people.figure.body import load_body_model
+
+    return load_body_model()
+
 
 HEIGHT, WIDTH = 96, 64
 BODY = {  # part: top, bottom, left, right in px; a person seen from the front

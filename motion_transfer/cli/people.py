@@ -110,9 +110,7 @@ def drive(
     "--split", default="train", metavar="NAME", help="train (default) or held-out: never the same."
 )
 @picture_option("--size", default="256x256", metavar="WxH", help="Pixels; default 256x256.")
-@picture_option(
-    "--framing", metavar="PART", help="full, three-quarters or upper; default: mixed."
-)
+@picture_option("--framing", metavar="PART", help="full, three-quarters or upper; default: mixed.")
 @picture_option("--noise", is_flag=True, help="Put DensePose's usual faults into the IUV.")
 @output_option("-o", "--out", type=FILE, required=True, help="A folder; completed if it has some.")
 @output_option("--workers", type=int, help="Processes; default: one for each core.")
@@ -143,14 +141,14 @@ BODY_OPTIONS = ("gender", "age", "height", "weight", "muscle", "proportions")
 
 
 def _shape(values: dict[str, float]) -> Any:
-    from motion_transfer.people.body import Shape
+    from motion_transfer.people.figure.body import Shape
 
     return Shape(**values)
 
 
 def _prepare(quiet: bool) -> None:
     """Where the body model has to compute its cache first, say so while it does."""
-    from motion_transfer.people.body import FIRST_USE, is_cached, load_body_model
+    from motion_transfer.people.figure.body import FIRST_USE, is_cached, load_body_model
 
     if not is_cached():
         with long_wait(FIRST_USE, quiet=quiet):

@@ -65,9 +65,7 @@ def read_photo(path: Path, what: str = "source") -> Photo:
     return Photo(path=path, rgb=np.ascontiguousarray(pixels[..., :3]), alpha=alpha, turned=turned)
 
 
-def write_png(
-    path: Path, pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W"]
-) -> None:
+def write_png(path: Path, pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W"]) -> None:
     """Write a picture, RGB or grey, as PNG. Raises: OSError."""
     ok, encoded = cv2.imencode(".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels)
     if not ok:

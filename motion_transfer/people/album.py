@@ -1,9 +1,9 @@
 """Folders of photos of synthetic people, with their IUV, alpha and description.
 
-    OUT/people.json             the settings, by which the folder is known
-    OUT/pairs.csv               source,target: pictures of one person, relative to OUT
-    OUT/000000/person.json      who it is, and each shot
-    OUT/000000/0.png            a photo; 0_IUV.png its IUV (file RGB = V, U, I), 0_alpha.png
+OUT/people.json             the settings, by which the folder is known
+OUT/pairs.csv               source,target: pictures of one person, relative to OUT
+OUT/000000/person.json      who it is, and each shot
+OUT/000000/0.png            a photo; 0_IUV.png its IUV (file RGB = V, U, I), 0_alpha.png
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from motion_transfer.media.image import write_png
 from motion_transfer.media.publish import explain_disk_errors, publish
 from motion_transfer.people.dataset import SPLITS, PeopleStream, Split
 from motion_transfer.people.extra import require_people
-from motion_transfer.people.framing import Framing
-from motion_transfer.people.iuv_noise import IuvNoise
+from motion_transfer.people.figure.framing import Framing
+from motion_transfer.people.picture.iuv_noise import IuvNoise
 from motion_transfer.version import __version__
 
 SETTINGS_FILE = "people.json"
@@ -93,7 +93,7 @@ class AlbumOptions:
         )
 
 
-def write_album(options: AlbumOptions, done: Callable[[int], None] = lambda count: None) -> int:
+def write_album(options: AlbumOptions, done: Callable[[int], object] = int) -> int:
     """Photograph people into a folder; people who are there already stay as they are.
 
     Args:
@@ -120,7 +120,7 @@ def write_album(options: AlbumOptions, done: Callable[[int], None] = lambda coun
 
 
 def _photograph_in_parallel(
-    options: AlbumOptions, missing: list[int], workers: int, done: Callable[[int], None]
+    options: AlbumOptions, missing: list[int], workers: int, done: Callable[[int], object]
 ) -> None:
     context = multiprocessing.get_context("spawn")  # threads of torch do not survive a fork
     with ProcessPoolExecutor(workers, context, _start_worker, (options,)) as pool:

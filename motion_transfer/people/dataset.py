@@ -11,11 +11,12 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from motion_transfer.errors import InputError
-from motion_transfer.people.body import load_body_model
-from motion_transfer.people.framing import Framing
-from motion_transfer.people.iuv_noise import IuvNoise
+from motion_transfer.people.extra import one_thread
+from motion_transfer.people.figure.body import load_body_model
+from motion_transfer.people.figure.framing import Framing
 from motion_transfer.people.person import DressedPerson, Person, sample_person
-from motion_transfer.people.photo import Photographer, PersonPhoto, Shot, sample_shot
+from motion_transfer.people.photo import PersonPhoto, Photographer, Shot, sample_shot
+from motion_transfer.people.picture.iuv_noise import IuvNoise
 
 Split = Literal["train", "held-out"]
 SPLITS: tuple[str, ...] = get_args(Split)
@@ -61,11 +62,13 @@ class PeopleStream:
 
     def dress(self, number: int) -> DressedPerson:
         """The geometry of that person."""
-        return DressedPerson(self.person(number), self._model)
+        with one_thread():
+            return DressedPerson(self.person(number), self._model)
 
     def take(self, dressed: DressedPerson, shot: Shot) -> PersonPhoto:
         """Take a photo."""
-        return self._photographer.take(dressed, shot, self.size, self._noise)
+        with one_thread():
+            return self._photographer.take(dressed, shot, self.size, self._noise)
 
     def _random(self, number: int, purpose: int) -> np.random.Generator:
         return np.random.default_rng((*self._entropy, number, purpose))

@@ -1,7 +1,7 @@
 """Drivers from motion: a reposed body, seen by a camera, as IUV frames.
 
-This is the paper's second kind of target pose, "obtained by reposing the mesh" (its Sec. 3). A still
-pose that turns once in front of the camera is a novel view.
+This is the paper's second kind of target pose, "obtained by reposing the mesh" (its Sec. 3). A
+still pose that turns once in front of the camera is a novel view.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
-from motion_transfer.people.body import Body, BodyModel, Shape, load_body_model
-from motion_transfer.people.camera import Camera
-from motion_transfer.people.charts import load_charts
-from motion_transfer.people.exact_iuv import render_iuv
-from motion_transfer.people.framing import FRAMINGS, Framing, frame_points, lowest_in
-from motion_transfer.people.mesh import PosedBody
-from motion_transfer.people.motions import MOTIONS
-from motion_transfer.people.posing import posed
+from motion_transfer.people.figure.body import Body, BodyModel, Shape, load_body_model
+from motion_transfer.people.figure.camera import Camera
+from motion_transfer.people.figure.charts import load_charts
+from motion_transfer.people.figure.exact_iuv import render_iuv
+from motion_transfer.people.figure.framing import FRAMINGS, Framing, frame_points, lowest_in
+from motion_transfer.people.figure.mesh import PosedBody
+from motion_transfer.people.motion.bvh import bvh_poses, read_bvh
+from motion_transfer.people.motion.motions import MOTIONS
+from motion_transfer.people.motion.posing import moved, posed
 
 PosedAt = Callable[[int], PosedBody]
 """Frame number -> body."""
@@ -135,3 +136,18 @@ def _named_motion(options: MotionOptions, body: Body, model: BodyModel) -> tuple
     count = options.frame_count or max(1, round(motion.seconds * options.frame_rate))
     cycles = max(1, round(count / (motion.seconds * options.frame_rate)))
     return count, lambda index: posed(body, motion.pose(index * cycles / count), model)
+
+
+def _captured_motion(options: MotionOptions, body: Body, model: BodyModel) -> tuple[int, PosedAt]:
+    """A BVH file's motion, at the wanted rate."""
+    captured = read_bvh(Path(options.motion))
+    seconds = len(captured.frames) / captured.frame_rate
+    count = options.frame_count or max(1, round(seconds * options.frame_rate))
+    poses = bvh_poses(captured, body, travel=options.travel)
+    poses = poses.resampled(count, options.frame_rate)
+
+    def posed_at(index: int) -> PosedBody:
+        rotations, offset = poses[index]
+        return moved(body, rotations, offset, model)
+
+    return count, posed_at

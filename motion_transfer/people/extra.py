@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
 from importlib.util import find_spec
 
 from motion_transfer.errors import InputError
@@ -15,3 +19,41 @@ def require_people() -> None:
             f"synthetic people need {' and '.join(missing)}, which is not installed;"
             " pip install 'motion-transfer[people]'"
         )
+
+
+@cache
+def start_warp() -> None:
+    """Initialise `warp` without its banner, and without its remark that there is no GPU.
+
+    The remark comes from native code, so that only the file descriptor can be kept from it.
+    """
+    import warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        warp.init()
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(nowhere)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keep OpenCV and torch to one thread: their sums depend on how work is shared among several.
+
+    What is computed here is small; several people are made in parallel by several processes.
+    """
+    import cv2
+    import torch
+
+    before = cv2.getNumThreads(), torch.get_num_threads()
+    cv2.setNumThreads(1)
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before[0])
+        torch.set_num_threads(before[1])

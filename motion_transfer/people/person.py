@@ -8,16 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from motion_transfer.people.body import Body, BodyModel, Shape
-from motion_transfer.people.faces import Face, sample_face
-from motion_transfer.people.garments import dress_body
-from motion_transfer.people.hair import Hair, hair_pieces, sample_hair
-from motion_transfer.people.mesh import Piece, PosedBody
-from motion_transfer.people.outfits import Outfit, sample_outfit
-from motion_transfer.people.poses import Pose
-from motion_transfer.people.posing import posed
-from motion_transfer.people.skin import skin_pieces
-from motion_transfer.people.surface import BodySurface
+from motion_transfer.people.clothes.garments import dress_body
+from motion_transfer.people.clothes.outfits import Outfit, sample_outfit
+from motion_transfer.people.clothes.surface import BodySurface
+from motion_transfer.people.figure.body import Body, BodyModel, Shape
+from motion_transfer.people.figure.mesh import Piece, PosedBody
+from motion_transfer.people.head.faces import Face, sample_face
+from motion_transfer.people.head.hair import hair_pieces
+from motion_transfer.people.head.hair_styles import Hair, sample_hair
+from motion_transfer.people.head.skin import skin_pieces
+from motion_transfer.people.motion.capsules import Capsules
+from motion_transfer.people.motion.poses import Pose
+from motion_transfer.people.motion.posing import posed
+from motion_transfer.people.motion.untangling import untangled
+from motion_transfer.people.picture.shade import Scene
 
 
 @dataclass(frozen=True)
@@ -37,10 +41,11 @@ class Person:
 def sample_person(rng: np.random.Generator) -> Person:
     """Anybody, over the whole range of adult bodies."""
     shape = sample_shape(rng)
+    face = sample_face(rng, shape)
     return Person(
         shape=shape,
-        face=sample_face(rng, shape),
-        hair=sample_hair(rng, shape),
+        face=face,
+        hair=sample_hair(rng, shape, face),
         outfit=sample_outfit(rng, shape),
     )
 
@@ -76,12 +81,14 @@ class DressedPerson:
         person: the description.
         body: the bare body at rest.
         pieces: skin, garments, hair; the skin comes first.
+        scene: the pieces, ready to be drawn.
     """
 
     def __init__(self, person: Person, model: BodyModel) -> None:
         self.person = person
         self.body: Body = model.body(person.shape)
         self._model = model
+        self._capsules = Capsules(model, self.body)
         skin, *rest = skin_pieces(person.face, self.body, model)
         dressed = dress_body(person.outfit, self.body, model, body_surface(model))
         covered = replace(skin, keep=np.minimum(skin.keep, dressed.body_keep))
@@ -91,10 +98,11 @@ class DressedPerson:
             *dressed.pieces,
             *hair_pieces(person.hair, self.body, model),
         ]
+        self.scene = Scene(self.pieces)
 
     def posed(self, pose: Pose) -> PosedBody:
-        """The body in a pose, standing on the floor z = 0."""
-        return posed(self.body, pose, self._model)
+        """The body in a pose, on the floor; limbs that would go through it are moved aside."""
+        return posed(self.body, untangled(pose, self._capsules), self._model)
 
 
 @lru_cache(maxsize=1)

@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from motion_transfer.people.backgrounds import Background, paint_background, sample_background
-from motion_transfer.people.body import BodyModel
-from motion_transfer.people.camera import Camera
-from motion_transfer.people.charts import load_charts
-from motion_transfer.people.exact_iuv import render_iuv
-from motion_transfer.people.framing import Framing, frame_points, lowest_in
-from motion_transfer.people.ground import floor_shadow
-from motion_transfer.people.iuv_noise import IuvNoise, add_iuv_noise
-from motion_transfer.people.light import Light, sample_light
+from motion_transfer.people.figure.body import BodyModel
+from motion_transfer.people.figure.camera import Camera
+from motion_transfer.people.figure.charts import load_charts
+from motion_transfer.people.figure.exact_iuv import render_iuv
+from motion_transfer.people.figure.framing import Framing, frame_points, lowest_in
+from motion_transfer.people.motion.pose_sampler import sample_pose
+from motion_transfer.people.motion.poses import Pose
 from motion_transfer.people.person import DressedPerson
-from motion_transfer.people.pose_sampler import sample_pose
-from motion_transfer.people.poses import Pose
-from motion_transfer.people.shade import Shading, shade
+from motion_transfer.people.picture.backgrounds import (
+    Background,
+    paint_background,
+    sample_background,
+)
+from motion_transfer.people.picture.ground import floor_shadow
+from motion_transfer.people.picture.iuv_noise import IuvNoise, add_iuv_noise
+from motion_transfer.people.picture.light import Light, sample_light
+from motion_transfer.people.picture.shade import Shading
 
 FRAMING_SHARES: dict[Framing, float] = {"full": 0.6, "three-quarters": 0.25, "upper": 0.15}
+FRAMED_STEP = 5
+"""One in so many vertices is enough to point a camera by."""
+
 LENS_NOISE = 0.006
 """Sensor noise of a small photo, as a share of white."""
 
@@ -107,9 +114,11 @@ class Photographer:
         """Take a shot at a size of (width, height) px."""
         rng = np.random.default_rng(shot.seed)
         posed = dressed.posed(shot.pose)
+        points = np.concatenate([piece.posed(posed) for piece in dressed.pieces])
         lowest = lowest_in(posed.joints, self._model.skeleton, shot.framing)
+        outline = points[::FRAMED_STEP]
         camera = frame_points(
-            posed.points[posed.points[:, 2] >= lowest],
+            outline[outline[:, 2] >= lowest],
             size,
             distance=shot.distance,
             elevation=shot.elevation,
@@ -117,36 +126,43 @@ class Photographer:
             margin=shot.margin,
             shift=shot.shift,
         )
-        seen = shade(dressed.pieces, posed, camera, shot.light)
+        seen = dressed.scene.shade(points, camera, shot.light)
         alpha = np.rint(seen.coverage * 255).astype(np.uint8)
+        background = replace(shot.background, camera_metres=max(float(camera.position[2]), 0.2))
         horizon = camera.height / 2 - camera.focal_px * np.tan(camera.elevation)
         pixels_per_metre = camera.focal_px / camera.distance
         behind = paint_background(
-            shot.background, camera.height, camera.width, float(horizon), pixels_per_metre
+            background, camera.height, camera.width, float(horizon), pixels_per_metre
         )
         if shot.background.has_floor:
             behind *= 1 - floor_shadow(posed.points, camera, shot.light)[..., None]
-        rgb = develop(composite(seen, behind), shot.grain, rng)
+        rgb = develop(seen, behind, shot.grain, rng)
         iuv = render_iuv(posed.points, self._model.faces, self._charts, camera)
         if noise is not None:
             iuv = add_iuv_noise(iuv, noise, rng)
         return PersonPhoto(rgb, alpha, iuv, camera)
 
 
-def composite(seen: Shading, behind: Float32[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"]:
-    """The person in front of a background, both linear."""
-    return seen.colour + behind * (1 - seen.coverage[..., None])
-
-
 def develop(
-    linear: Float32[np.ndarray, "H W 3"], grain: float, rng: np.random.Generator
+    seen: Shading,
+    behind: Float32[np.ndarray, "H W 3"],
+    grain: float,
+    rng: np.random.Generator,
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """Linear light as 8-bit sRGB, with sensor noise; what is too bright rolls off softly."""
-    index = np.clip(linear * (len(_TONE) - 1) / TONE_RANGE, 0, len(_TONE) - 1).astype(np.uint16)
-    tone = _TONE[index]
+    """The person in front of a background as 8-bit sRGB; what is too bright rolls off softly.
+
+    Args:
+        behind: linear RGB.
+        grain: sensor noise, standard deviation as a share of white.
+    """
+    linear = seen.colour + behind * (1 - seen.coverage[..., None])
+    np.minimum(linear, TONE_RANGE, out=linear)
+    linear *= (len(_TONE) - 1) / TONE_RANGE
+    tone = np.take(_TONE, linear.astype(np.int32))
     if grain > 0:
         tone += rng.standard_normal(tone.shape[:2], np.float32)[..., None] * (255 * grain)
-    return np.clip(np.rint(tone), 0, 255).astype(np.uint8)
+        np.clip(tone, 0, 255, out=tone)
+    return (tone + 0.5).astype(np.uint8)
 
 
 TONE_RANGE = 2.0

@@ -26,7 +26,7 @@ def record_motion(
     output: Path,
     *,
     force: bool = False,
-    done: Callable[[int], None] = lambda count: None,
+    done: Callable[[int], object] = int,
 ) -> MotionDriver:
     """Write a driver. Colours of the files are V, U, I, as those of Caffe2's DensePose.
 

@@ -149,7 +149,7 @@ def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, Driver
 def _open_driver(options: RenderOptions, listener: Listener) -> IuvStream:
     if not is_motion(options.driver):
         return open_stream(options.driver, missing=options.missing)
-    from motion_transfer.people.body import FIRST_USE, is_cached
+    from motion_transfer.people.figure.body import FIRST_USE, is_cached
     from motion_transfer.people.stream import open_motion
 
     if not is_cached():

@@ -1,0 +1,1 @@
+"""Fabrics, outfits, and garments with geometry of their own."""

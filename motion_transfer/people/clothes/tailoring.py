@@ -1,0 +1,190 @@
+"""Panels of cloth made into textures: folds, seams, hems, plackets, pockets, prints.
+
+Convention: while it is worked on, a panel is sRGB H x W x 3 float32 with a relief H x W in metres;
+the finished texture is linear, H x W x 4, as `Material` wants it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+from jaxtyping import Float32
+
+from motion_transfer.people.clothes.cuts import Places
+from motion_transfer.people.clothes.fabrics import Colour
+
+_TILE = 640  # texels; larger than any panel's side
+
+
+def _linear_table() -> np.ndarray:
+    value = np.arange(256) / 255
+    table = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    return table.astype(np.float32)[None]
+
+
+_LINEAR = _linear_table()
+
+
+def linear(colours: Float32[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"]:
+    """sRGB 0..1 to linear, through eight bits."""
+    return cv2.LUT(cv2.convertScaleAbs(colours, alpha=255), _LINEAR)
+
+
+@cache
+def crease_tiles() -> np.ndarray:
+    """Reliefs of creased cloth with ridges in several directions.
+
+    Returns: tiles x _TILE x _TILE, of deviation 1.
+    """
+    rng = np.random.default_rng(20)
+    tiles = []
+    for angle in (30, -35, 65, -60, 45, 85):
+        side = _TILE // 2  # the noise is drawn at a quarter of the scale: it is slow
+        waves = np.zeros((_TILE, _TILE), np.float32)
+        for along, across, gain in ((55, 11, 1.0), (30, 5, 0.3)):
+            noise = rng.normal(size=(side, side)).astype(np.float32)
+            noise = cv2.GaussianBlur(noise, (0, 0), sigmaX=along / 4, sigmaY=across / 4)
+            turn = cv2.getRotationMatrix2D((side / 2, side / 2), angle, 1)
+            noise = cv2.warpAffine(noise, turn, (side, side))[side // 4 : -side // 4]
+            noise = noise[:, side // 4 : -side // 4]
+            noise = cv2.resize(noise, (_TILE, _TILE), interpolation=cv2.INTER_CUBIC)
+            noise /= noise.std()
+            waves += gain * (np.sqrt(noise**2 + 0.05) - 0.8)  # rounded ridges
+        tiles.append(waves / waves.std())
+    return np.stack(tiles)
+
+
+def creases(
+    shape: tuple[int, int], rng: np.random.Generator, height: float
+) -> Float32[np.ndarray, "H W"]:
+    """A relief of creased cloth whose deviation is about `height` metres."""
+    tiles = crease_tiles()
+    parts = []
+    for _ in range(2):
+        tile = tiles[rng.integers(len(tiles))]
+        y, x = (int(rng.integers(_TILE - side + 1)) for side in shape)
+        parts.append(tile[y : y + shape[0], x : x + shape[1]])
+    return cv2.addWeighted(parts[0], 0.8 * height, parts[1], 0.6 * height, 0.0)
+
+
+class Panel:
+    """A garment's panel while it is decorated.
+
+    Attributes:
+        colours: H x W x 3 sRGB, changed in place.
+        shade: H x W, what the colours are multiplied by in the end; changed in place.
+        relief: H x W metres, changed in place.
+    """
+
+    def __init__(
+        self,
+        colours: Float32[np.ndarray, "H W 3"],
+        shade: np.ndarray | None = None,
+        relief: np.ndarray | None = None,
+    ) -> None:
+        self.colours = colours
+        self.shade = np.ones(colours.shape[:2], np.float32) if shade is None else shade
+        self.relief = np.zeros(colours.shape[:2], np.float32) if relief is None else relief
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in texels."""
+        height, width = self.colours.shape[:2]
+        return height, width
+
+    def part(self, rows: slice, columns: slice) -> Panel:
+        """Part of the panel; changes to it are changes to the whole."""
+        at = rows, columns
+        return Panel(self.colours[at], self.shade[at], self.relief[at])
+
+    def tint(self, cover: np.ndarray, colour: Colour) -> None:
+        """Lay a colour over, `cover` (H x W, 0..1) of the way."""
+        at = _box(cover)
+        part = self.colours[at]
+        part += cover[at][..., None] * (np.asarray(colour, np.float32) - part)
+
+    def dim(self, cover: np.ndarray, share: float) -> None:
+        """Darken by a share where `cover` is 1."""
+        at = _box(cover)
+        self.shade[at] *= 1 - np.float32(share) * cover[at]
+
+    def raise_by(self, cover: np.ndarray, metres: float) -> None:
+        """Lift where `cover` is 1."""
+        at = _box(cover)
+        self.relief[at] += np.float32(metres) * cover[at]
+
+    def stitch(self, distance: np.ndarray, place: float, strength: float = 0.14) -> None:
+        """A seam where a distance takes a value: a dark line in a shallow furrow."""
+        cover = line(distance, place, 0.005)
+        at = _box(cover)
+        part = cover[at]
+        self.shade[at] *= 1 - np.float32(strength) * part
+        self.relief[at] -= np.float32(0.0008) * part
+
+    def ribs(self, cover: np.ndarray, deep: float = 0.14) -> None:
+        """Ribbed knit along the columns where `cover` is 1."""
+        ribs = (np.arange(cover.shape[1]) % 3 == 0).astype(np.float32)
+        self.dim(cover * ribs, deep)
+
+    def decal(
+        self, image: Float32[np.ndarray, "h w 4"], across: np.ndarray, down: np.ndarray
+    ) -> None:
+        """Print an image where `across` and `down` (H x W) run from 0 to 1 over it.
+
+        Args:
+            image: sRGB and coverage, 0..1.
+        """
+        at = _box(((across > 0) & (across < 1) & (down > 0) & (down < 1)).astype(np.float32))
+        x = across[at] * np.float32(image.shape[1]) - np.float32(0.5)
+        y = down[at] * np.float32(image.shape[0]) - np.float32(0.5)
+        if x.size == 0:
+            return
+        ink = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        part = self.colours[at]
+        part += ink[..., 3:] * (ink[..., :3] - part)
+
+    def texture(self) -> Float32[np.ndarray, "H W 4"]:
+        """The finished texture."""
+        shaded = cv2.multiply(self.colours, cv2.merge([self.shade] * 3))
+        out = np.empty((*self.relief.shape, 4), np.float32)
+        cv2.mixChannels([linear(shaded), self.relief], [out], [0, 0, 1, 1, 2, 2, 3, 3])
+        return out
+
+
+def _box(cover: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns outside of which `cover` is 0."""
+    rows = np.flatnonzero(cover.max(1) > 0)
+    if len(rows) == 0:
+        return slice(0, 0), slice(0, 0)
+    columns = np.flatnonzero(cover[rows[0] : rows[-1] + 1].max(0) > 0)
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+
+def band(distance: np.ndarray, start: float, end: float, soft: float = 0.003) -> np.ndarray:
+    """1 where start < distance < end, with edges `soft` metres wide; 0..1."""
+    inside = np.minimum(distance - np.float32(start), np.float32(end) - distance)
+    return np.clip(inside * np.float32(1 / soft) + 0.5, 0, 1)
+
+
+def line(distance: np.ndarray, place: float, width: float = 0.004) -> np.ndarray:
+    """A line where a distance takes a value; 0..1."""
+    return band(distance, place - width / 2, place + width / 2)
+
+
+def front_of(at: Places) -> np.ndarray:
+    """1 on the front of the trunk, 0 on back and sleeves."""
+    return ((at.y < -0.03) & (at.on_arm < 0.5)).astype(np.float32)
+
+
+def disc(at: Places, x: float, z: float, radius: float) -> np.ndarray:
+    """1 inside a circle on the front, seen from the front."""
+    away = np.sqrt((at.x - np.float32(x)) ** 2 + (at.z - np.float32(z)) ** 2)
+    return band(away, -1, radius) * front_of(at)
+
+
+def box(at: Places, x: tuple[float, float], z: tuple[float, float]) -> np.ndarray:
+    """Distance inside a rectangle seen from the front or the back, metres."""
+    across = np.minimum(at.x - np.float32(x[0]), np.float32(x[1]) - at.x)
+    return np.minimum(across, np.minimum(at.z - np.float32(z[0]), np.float32(z[1]) - at.z))

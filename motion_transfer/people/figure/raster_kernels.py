@@ -1,0 +1,49 @@
+"""What `rasterise` runs for each triangle, compiled by `warp`; types are warp's, not Python's."""
+
+import warp as wp
+
+from motion_transfer.people.extra import start_warp
+
+start_warp()
+
+
+@wp.kernel(enable_backward=False)
+def fill(
+    screen: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    keep: wp.array(dtype=wp.float32),
+    cull: wp.array(dtype=wp.uint8),
+    width: wp.int32,
+    height: wp.int32,
+    nearest: wp.array(dtype=wp.uint64),
+):
+    f = wp.tid()
+    corners = faces[f]
+    a, b, c = screen[corners[0]], screen[corners[1]], screen[corners[2]]
+    if a[2] <= 0.0 or b[2] <= 0.0 or c[2] <= 0.0:
+        return
+    # twice the signed area; y points down, so outward (counter-clockwise) faces are negative
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    if area == 0.0 or (area > 0.0 and cull[f] != wp.uint8(0)):
+        return
+    ka, kb, kc = keep[corners[0]], keep[corners[1]], keep[corners[2]]
+    if ka < 0.0 and kb < 0.0 and kc < 0.0:
+        return
+    x0 = wp.max(int(wp.ceil(wp.min(a[0], wp.min(b[0], c[0])) - 0.5)), 0)
+    x1 = wp.min(int(wp.floor(wp.max(a[0], wp.max(b[0], c[0])) - 0.5)), width - 1)
+    y0 = wp.max(int(wp.ceil(wp.min(a[1], wp.min(b[1], c[1])) - 0.5)), 0)
+    y1 = wp.min(int(wp.floor(wp.max(a[1], wp.max(b[1], c[1])) - 0.5)), height - 1)
+    ia, ib, ic = 1.0 / a[2], 1.0 / b[2], 1.0 / c[2]
+    for y in range(y0, y1 + 1):
+        py = float(y) + 0.5
+        for x in range(x0, x1 + 1):
+            px = float(x) + 0.5
+            wb = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / area
+            wc = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / area
+            wa = 1.0 - wb - wc
+            if wa < 0.0 or wb < 0.0 or wc < 0.0 or wa * ka + wb * kb + wc * kc < 0.0:
+                continue
+            z = 1.0 / (wa * ia + wb * ib + wc * ic)
+            # positive floats sort as their bits do: depth above, triangle below
+            bits = wp.uint64(wp.cast(z, wp.uint32))
+            wp.atomic_min(nearest, y * width + x, (bits << wp.uint64(32)) | wp.uint64(f))

@@ -1,0 +1,1 @@
+"""Skin, faces, and hair."""

@@ -1,0 +1,1 @@
+"""Poses as joint angles, named motions, and motion capture."""

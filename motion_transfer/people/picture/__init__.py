@@ -1,0 +1,1 @@
+"""Drawing, light, surroundings, and the faults of real IUV."""

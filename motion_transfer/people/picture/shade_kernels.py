@@ -1,0 +1,207 @@
+"""What `Scene` runs for each sample, compiled by `warp`; types are warp's, not Python's."""
+
+import numpy as np
+import warp as wp
+
+from motion_transfer.people.extra import start_warp
+
+start_warp()
+
+SHADOW_BIAS_METRES = 0.012
+SCATTER_METRES = 0.1
+
+WRAP_TINT = wp.constant(wp.vec3(1.0, 0.55, 0.4))
+"""Light that wraps around skin has passed through it, and comes out red."""
+
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+SHADOW_DISC = wp.constant(
+    wp.types.matrix((8, 2), wp.float32)(
+        *(
+            float(np.sqrt((k + 0.5) / 8) * turn(GOLDEN_ANGLE * k))
+            for k in range(8)
+            for turn in (np.cos, np.sin)
+        )
+    )
+)
+"""Eight places spread evenly over a disc of radius 1."""
+
+
+@wp.struct
+class LightInput:
+    toward: wp.mat33  # rows: unit vectors toward the lamps
+    colour: wp.mat33  # rows
+    lamps: wp.int32
+    sky: wp.vec3
+    ground: wp.vec3
+    camera: wp.vec3
+    shadow_x: wp.vec4  # rows of the map from the world to shadow-map pixels and depth
+    shadow_y: wp.vec4
+    shadow_z: wp.vec4
+    softness_px: wp.float32
+    lit: wp.int32
+
+
+@wp.struct
+class MaterialInput:
+    first_texel: wp.int32
+    height: wp.int32
+    width: wp.int32
+    relief: wp.int32
+    size: wp.vec2
+    gloss: wp.float32
+    sharpness: wp.float32
+    translucency: wp.float32
+    sheen_along_v: wp.int32
+
+
+@wp.kernel(enable_backward=False)
+def add_normals(
+    points: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    normals: wp.array(dtype=wp.vec3),
+):
+    corners = faces[wp.tid()]
+    a = points[corners[0]]
+    n = wp.cross(points[corners[1]] - a, points[corners[2]] - a)
+    wp.atomic_add(normals, corners[0], n)
+    wp.atomic_add(normals, corners[1], n)
+    wp.atomic_add(normals, corners[2], n)
+
+
+@wp.func
+def _texel(texture: wp.array(dtype=wp.vec4), material: MaterialInput, u: float, v: float):
+    """Bilinear; repeats along u, clamps along v."""
+    height, width = material.height, material.width
+    x = (u - wp.floor(u)) * float(width) - 0.5
+    y = wp.clamp(v * float(height) - 0.5, 0.0, float(height - 1))
+    x0, y0 = int(wp.floor(x)), int(wp.floor(y))
+    fx, fy = x - float(x0), y - float(y0)
+    upper = material.first_texel + y0 * width
+    lower = material.first_texel + wp.min(y0 + 1, height - 1) * width
+    x1 = x0 + 1
+    if x0 < 0:
+        x0 = width - 1
+    if x1 >= width:
+        x1 = 0
+    top = texture[upper + x0] * (1.0 - fx) + texture[upper + x1] * fx
+    bottom = texture[lower + x0] * (1.0 - fx) + texture[lower + x1] * fx
+    return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def _key_share(
+    light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: float
+):
+    """How much of the key lamp a point sees, from 8 places of a disc in the shadow map."""
+    p = wp.vec4(point[0], point[1], point[2], 1.0)
+    x, y, z = wp.dot(light.shadow_x, p), wp.dot(light.shadow_y, p), wp.dot(light.shadow_z, p)
+    cosine, sine = light.softness_px * wp.cos(spin), light.softness_px * wp.sin(spin)
+    open_taps = 0.0
+    for k in range(8):
+        dx, dy = SHADOW_DISC[k, 0], SHADOW_DISC[k, 1]
+        i = wp.clamp(int(y + dx * sine + dy * cosine), 0, shadow.shape[0] - 1)
+        j = wp.clamp(int(x + dx * cosine - dy * sine), 0, shadow.shape[1] - 1)
+        if shadow[i, j] > z:
+            open_taps += 0.125
+    return open_taps
+
+
+@wp.kernel(enable_backward=False)
+def shade_samples(
+    sample: wp.array(dtype=wp.int32),
+    seen_face: wp.array(dtype=wp.int32),
+    screen: wp.array(dtype=wp.vec3),
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    corner_uv: wp.array2d(dtype=wp.vec2),
+    piece: wp.array(dtype=wp.uint8),
+    materials: wp.array(dtype=MaterialInput),
+    texture: wp.array(dtype=wp.vec4),
+    light: LightInput,
+    shadow: wp.array2d(dtype=wp.float32),
+    openness: wp.array2d(dtype=wp.float32),
+    samples: wp.int32,
+    colour: wp.array2d(dtype=wp.vec4),
+):
+    i = wp.tid()
+    face = seen_face[i]
+    width = colour.shape[1] * samples
+    row, column = sample[i] // width, sample[i] % width
+    corners = faces[face]
+    sa, sb, sc = screen[corners[0]], screen[corners[1]], screen[corners[2]]
+    px, py = float(column) + 0.5, float(row) + 0.5
+    area = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
+    wb = ((px - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (py - sa[1])) / area
+    wc = ((sb[0] - sa[0]) * (py - sa[1]) - (px - sa[0]) * (sb[1] - sa[1])) / area
+    wa = (1.0 - wb - wc) / sa[2]
+    wb = wb / sb[2]
+    wc = wc / sc[2]
+    total = wa + wb + wc
+    wa = wa / total
+    wb = wb / total
+    wc = wc / total
+
+    ta, tb, tc = corner_uv[face, 0], corner_uv[face, 1], corner_uv[face, 2]
+    uv = ta * wa + tb * wb + tc * wc
+    material = materials[int(piece[face])]
+    texel = _texel(texture, material, uv[0], uv[1])
+    albedo = wp.vec3(texel[0], texel[1], texel[2])
+    result = albedo
+    if light.lit != 0:
+        pa, pb, pc = points[corners[0]], points[corners[1]], points[corners[2]]
+        point = pa * wa + pb * wb + pc * wc
+        normal = wp.normalize(
+            normals[corners[0]] * wa + normals[corners[1]] * wb + normals[corners[2]] * wc
+        )
+        view = wp.normalize(light.camera - point)
+        if area > 0.0:
+            normal = -normal  # the inside of cloth or hair
+
+        # directions in which u and v grow on the surface, for relief and strands
+        e1, e2 = pb - pa, pc - pa
+        d1, d2 = wp.cw_mul(tb - ta, material.size), wp.cw_mul(tc - ta, material.size)
+        det = d1[0] * d2[1] - d2[0] * d1[1]
+        along_v = wp.vec3(0.0, 0.0, 1.0)
+        if wp.abs(det) > 1.0e-9:
+            along_u = wp.normalize((e1 * d2[1] - e2 * d1[1]) / det)
+            along_v = wp.normalize((e2 * d1[0] - e1 * d2[0]) / det)
+            if material.relief != 0:
+                du, dv = 1.0 / float(material.width), 1.0 / float(material.height)
+                right = _texel(texture, material, uv[0] + du, uv[1])
+                below = _texel(texture, material, uv[0], uv[1] + dv)
+                slope_u = (right[3] - texel[3]) / (du * material.size[0])
+                slope_v = (below[3] - texel[3]) / (dv * material.size[1])
+                normal = wp.normalize(normal - along_u * slope_u - along_v * slope_v)
+
+        # turned by a different angle at every sample, so that 8 taps make no bands
+        spin = 6.2831853 * wp.frac(0.7548777 * float(column) + 0.5698403 * float(row))
+        # light that scatters in flesh gets around its own edge
+        inside = light.toward[0] * (material.translucency * SCATTER_METRES)
+        outside = point + normal * SHADOW_BIAS_METRES + inside
+        key = _key_share(light, shadow, outside, spin)
+        open_share = openness[row // samples, column // samples]
+        upward = 0.5 + 0.5 * normal[2]
+        incoming = (light.ground * (1.0 - upward) + light.sky * upward) * open_share
+        highlight = wp.vec3(0.0, 0.0, 0.0)
+        wrap = WRAP_TINT * material.translucency
+        one = wp.vec3(1.0, 1.0, 1.0)
+        for k in range(light.lamps):
+            toward = light.toward[k]
+            seen = wp.where(k == 0, key, open_share)
+            cosine = wp.dot(normal, toward)
+            bent = wp.cw_div(one * cosine + wrap, one + wrap)
+            bent = wp.vec3(wp.max(bent[0], 0.0), wp.max(bent[1], 0.0), wp.max(bent[2], 0.0))
+            incoming += wp.cw_mul(light.colour[k], bent) * seen
+            if material.gloss > 0.0 and cosine > -0.2:
+                half = wp.normalize(toward + view)
+                shine = wp.max(wp.dot(normal, half), 0.0)
+                if material.sheen_along_v != 0:
+                    across = wp.dot(along_v, half)
+                    shine = wp.sqrt(wp.max(1.0 - across * across, 0.0))
+                strength = material.gloss * seen * wp.clamp(cosine * 3.0 + 0.6, 0.0, 1.0)
+                highlight += light.colour[k] * (strength * wp.pow(shine, material.sharpness))
+        result = wp.cw_mul(albedo, incoming) + highlight
+    share = 1.0 / float(samples * samples)
+    value = wp.vec4(result[0] * share, result[1] * share, result[2] * share, share)
+    wp.atomic_add(colour, row // samples, column // samples, value)

@@ -1,0 +1,56 @@
+"""Make the demo's photo, its IUV and its driver anew: `python tools/build_demo.py`.
+
+They are a synthetic person and a motion of this project's own (`motion_transfer.people`), so that
+the same package versions on the same machine give the same files.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from motion_transfer.media.image import write_png
+from motion_transfer.people.dataset import PeopleStream
+from motion_transfer.people.driver import MotionOptions
+from motion_transfer.people.figure.body import Shape
+from motion_transfer.people.motion.pose_sampler import sample_pose
+from motion_transfer.people.picture.backgrounds import sample_background
+from motion_transfer.people.recording import record_motion
+
+DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"
+SEED, PERSON = 11, 16
+SOURCE_SIZE = (512, 768)
+DRIVER = MotionOptions(
+    motion="dance",
+    frame_count=120,
+    frame_rate=Fraction(15),
+    size=(256, 256),
+    shape=Shape(gender=0.0, muscle=0.6, height=0.55),
+)
+
+
+def main() -> None:
+    stream = PeopleStream(seed=SEED, size=SOURCE_SIZE)
+    rng = np.random.default_rng(PERSON)
+    shot = replace(
+        stream.shot(PERSON, 0),
+        framing="full",
+        pose=replace(sample_pose(rng, "standing"), turn=math.radians(12)),
+        background=sample_background(rng, "studio"),
+        elevation=0.03,
+        distance=5.0,
+        roll=0.0,
+        shift=(0.0, 0.0),
+    )
+    photo = stream.take(stream.dress(PERSON), shot)
+    write_png(DEMO / "source.png", photo.rgb)
+    write_png(DEMO / "source_IUV.png", photo.iuv[..., ::-1])
+    record_motion(DRIVER, DEMO / "driver.mkv", force=True)
+
+
+if __name__ == "__main__":
+    main()
