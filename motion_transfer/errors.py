@@ -5,7 +5,8 @@
     │   ├── IuvFileError                2   a file or frame that is not an IUV image
     │   ├── WeightsError                2   a file that is not a whole checkpoint
     │   └── OutputError                 2   a place or format that cannot be written
-    └── RenderError                     1   work that failed though its input was accepted
+    ├── RenderError                     1   work that failed though its input was accepted
+    └── TrainingError                   1   a run whose losses are no numbers any more
 
 Messages say what was wrong, where, and what to do next.
 """
@@ -39,3 +40,7 @@ class OutputError(InputError):
 
 class RenderError(MotionTransferError):
     """Rendering failed after its input had been accepted."""
+
+
+class TrainingError(MotionTransferError):
+    """Training failed after its input had been accepted."""

@@ -16,6 +16,7 @@ from motion_transfer.version import __version__
 COMMANDS = {
     "run": "Render the person of a photo in the motion of a driver.",
     "demo": "Render a photo and a driver that ship with the program.",
+    "train": "Train the network, or fine-tune it on one person.",
     "people": "Synthetic people: photos with exact IUV, and drivers from motion.",
     "eval": "Score renderers, and other methods' pictures, on the same pairs.",
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",
@@ -65,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     # read when torch is first imported, which no command has done yet
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
-        cli.main(args=arguments, prog_name="mt", standalone_mode=False)
+        code = cli.main(args=arguments, prog_name="mt", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return error.exit_code
@@ -78,9 +79,7 @@ def main(arguments: list[str] | None = None) -> int:
     except (KeyboardInterrupt, click.Abort):
         click.echo("mt: interrupted, nothing was left behind", err=True)
         return INTERRUPTED
-    except click.exceptions.Exit as end:
-        return end.exit_code
-    return 0
+    return code if isinstance(code, int) else 0  # click returns the code of an early exit
 
 
 def entry_point() -> None:

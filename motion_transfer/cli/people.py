@@ -94,7 +94,7 @@ def drive(
     settings = MotionOptions(
         motion=motion, frame_rate=parse_rate(fps), size=parse_size(size), shape=shape, **options
     )
-    _prepare(quiet)
+    prepare_body_model(quiet)
     with CountBar("drawing", unit="frame", quiet=quiet) as bar:
         driver = record_motion(settings, output, force=force, done=bar.advance)
     if not quiet:
@@ -129,7 +129,7 @@ def render(quiet: bool, size: str, **options: Any) -> None:
     from motion_transfer.people.stream import parse_size
 
     settings = AlbumOptions(size=parse_size(size), **options)
-    _prepare(quiet)
+    prepare_body_model(quiet)
     with CountBar("photographing", unit="person", total=settings.count, quiet=quiet) as bar:
         added = write_album(settings, bar.advance)
     if not quiet:
@@ -146,7 +146,7 @@ def _shape(values: dict[str, float]) -> Any:
     return Shape(**values)
 
 
-def _prepare(quiet: bool) -> None:
+def prepare_body_model(quiet: bool) -> None:
     """Where the body model has to compute its cache first, say so while it does."""
     from motion_transfer.people.figure.body import FIRST_USE, is_cached, load_body_model
 

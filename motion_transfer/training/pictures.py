@@ -79,6 +79,16 @@ class PhotoFile:
             " is beside it"
         )
 
+    @property
+    def alpha_path(self) -> Path:
+        """Where its alpha lies, if it is not in the photo itself."""
+        return self.path.with_name(f"{self.path.stem}_alpha.png")
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether `load` would find one. Raises: InputError if the photo cannot be read."""
+        return self.alpha_path.exists() or read_photo(self.path, "photo").alpha is not None
+
     def load(self) -> PersonPicture:
         """Raises: InputError if a file is missing or broken, sizes differ, or nobody is seen."""
         photo = read_photo(self.path, "photo")
@@ -89,7 +99,7 @@ class PhotoFile:
         return PersonPicture(self.name, photo.rgb, iuv, alpha)
 
     def _alpha_beside(self, photo: Photo) -> UInt8[np.ndarray, "H W"] | None:
-        path = self.path.with_name(f"{self.path.stem}_alpha.png")
+        path = self.alpha_path
         if not path.exists():
             return None
         alpha = read_photo(path, "alpha").rgb[..., 0]

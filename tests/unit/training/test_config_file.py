@@ -1,0 +1,132 @@
+"""`train.toml`: what is refused, and that what is written reads back the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from motion_transfer.errors import InputError
+from motion_transfer.training.config import PEOPLE_RECIPE, TrainConfig
+from motion_transfer.training.config_file import (
+    build_config,
+    check_value,
+    parse_assignment,
+    read_settings,
+    write_toml,
+)
+from nhrr_core import ModelConfig
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "train.toml"
+    path.write_text(text)
+    return path
+
+
+def test_the_defaults_are_the_papers() -> None:
+    config = build_config({"data.source": "pairs.csv"})
+    weights = config.losses.weights
+    assert (weights.perceptual, weights.adversarial, weights.identity, weights.texture) == (
+        *(10, 1, 5, 1),
+    )
+    assert (config.optimiser.learning_rate, config.optimiser.beta1) == (2e-4, 0.5)
+    assert config.losses.discriminator_scales == 3
+    assert config.losses.identity == "sphereface"
+    assert config.losses.adversarial
+    assert config.model == ModelConfig.preset("lite")
+
+
+def test_people_come_with_alpha_and_without_a_face_network() -> None:
+    config = build_config({})
+    assert config.model.alpha
+    assert config.losses.identity == "none"
+    chosen = build_config({"losses.identity": "sphereface", "model.alpha": False})
+    assert (chosen.losses.identity, chosen.model.alpha) == ("sphereface", False)
+    assert set(PEOPLE_RECIPE) == {"model.alpha", "losses.identity"}
+
+
+def test_written_and_read_it_is_the_same(tmp_path: Path) -> None:
+    config = build_config(
+        {
+            "data.source": 'a "quoted"\tfölder\\',
+            "losses.adversarial": False,
+            "optimiser.learning_rate": 1e-5,
+            "model.preset": "paper",
+            "model.variant": "ip",
+        }
+    )
+    text = write_toml(config)
+    settings = read_settings(write(tmp_path, text))
+    assert build_config(settings) == config
+    assert write_toml(build_config(settings)) == text
+    assert len(settings) == text.count(" = ")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[run]\nsteps = 5\n\n[losses]\nperceptul = 'none'\n", r"line 4, \[losses\]: unknown key"),
+        ("[lossses]\nidentity = 'none'\n", r"line 1.*unknown section 'lossses'"),
+        ("steps = 5\n", "line 1: steps stands outside a section"),
+        ("[run]\nsteps = '5'\n", r"run\.steps is '5'; it must be of type int"),
+        ("[run]\nsteps = true\n", r"run\.steps is True"),
+        ("[run\n", "is not TOML"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read_settings(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value"),
+    [
+        ("run.steps=7", "run.steps", 7),
+        ("losses.texture_weight=2", "losses.texture_weight", 2.0),
+        ("losses.perceptual=vgg19", "losses.perceptual", "vgg19"),
+        ("model.alpha=true", "model.alpha", True),
+        ("data.source=/a b/c", "data.source", "/a b/c"),
+    ],
+)
+def test_assignments(text: str, name: str, value: object) -> None:
+    assert parse_assignment(text) == (name, value)
+    assert type(parse_assignment(text)[1]) is type(value)
+
+
+@pytest.mark.parametrize("text", ["run.steps", "run.step=4", "steps=4"])
+def test_bad_assignments(text: str) -> None:
+    with pytest.raises(InputError):
+        parse_assignment(text)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("run.steps", 0, "it must be 1 or more"),
+        ("losses.perceptual", "vgg16", "efficientnet-lite0 or vgg19 or none"),
+        ("optimiser.beta1", 1.0, "below 1"),
+        ("losses.texture_weight", float("nan"), "0 or more"),
+        ("speed.precision", "fp16", "auto or fp32 or bf16"),
+        ("model.image_size", 60, r"\[model\]: image_size is 60"),
+        ("data.background", "pinkish", "background"),
+    ],
+)
+def test_impossible_values(name: str, value: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        build_config({name: check_value(name, value)})
+
+
+def test_weights_to_start_from_decide_the_shape() -> None:
+    given = ModelConfig(render_width=8)
+    assert build_config({}, model=given).model == given
+    assert build_config({"model.render_width": 8}, model=given).model == given
+    with pytest.raises(InputError, match=r"model\.render_width is 16, but the weights .* have 8"):
+        build_config({"model.render_width": 16}, model=given)
+
+
+def test_the_stages_of_ip() -> None:
+    assert TrainConfig().inpainting_steps == 0
+    assert build_config({"model.variant": "ip", "run.steps": 10}).inpainting_steps == 5
+    chosen = {"model.variant": "ip", "run.steps": 10, "optimiser.inpainting_steps": 3}
+    assert build_config(chosen).inpainting_steps == 3

