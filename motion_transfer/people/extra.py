@@ -10,7 +10,6 @@ from importlib.util import find_spec
 
 from motion_transfer.errors import InputError
 
-
 PEOPLE_EXTRA = "motion-transfer[people]"
 
 

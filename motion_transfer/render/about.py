@@ -60,9 +60,7 @@ def describe_setup() -> Facts:
             "texture": "ready (default; a draft, no weights)",
             "nhrr": "with --weights FILE",
         },
-        "people": "installed"
-        if missing_packages() == []
-        else "pip install 'motion-transfer[people]'",
+        "people": f"pip install '{PEOPLE_EXTRA}'" if missing_packages() else "installed",
         "weights": "none ship yet",
         "presets": {name: describe_preset(config) for name, config in PRESETS.items()},
     }
