@@ -47,12 +47,20 @@ class Shading:
     """Pieces seen by a camera.
 
     Attributes:
-        colour: H x W x 3 linear RGB, multiplied by the coverage.
-        coverage: H x W, share of each pixel that the person covers, in steps of 1 / SAMPLES^2.
+        rgba: H x W x 4: linear RGB multiplied by the coverage, and the coverage.
     """
 
-    colour: Float32[np.ndarray, "H W 3"]
-    coverage: Float32[np.ndarray, "H W"]
+    rgba: Float32[np.ndarray, "H W 4"]
+
+    @property
+    def colour(self) -> Float32[np.ndarray, "H W 3"]:
+        """Linear RGB, multiplied by the coverage."""
+        return self.rgba[..., :3]
+
+    @property
+    def coverage(self) -> Float32[np.ndarray, "H W"]:
+        """Share of each pixel that the person covers, in steps of 1 / SAMPLES^2."""
+        return self.rgba[..., 3]
 
 
 class Scene:
@@ -108,8 +116,7 @@ class Scene:
             SAMPLES,
         ]
         wp.launch(shade_samples, len(sample), inputs=inputs, outputs=[out], device="cpu")
-        rgba = out.numpy()
-        return Shading(rgba[..., :3], rgba[..., 3])
+        return Shading(out.numpy())
 
 
 def vertex_normals(points: Points, triangles: Triangles) -> Float32[np.ndarray, "V 3"]:
@@ -128,7 +135,7 @@ def _material(piece: Piece, first_texel: int) -> Any:
     material, made = piece.material, MaterialInput()
     made.first_texel = first_texel
     made.height, made.width = material.texture.shape[:2]
-    made.relief = int(np.ptp(material.texture[..., 3]) > 0)
+    made.relief = int(material.texture[..., 3].any())
     made.size = wp.vec2(*material.size_metres)
     made.gloss = material.gloss
     made.sharpness = material.sharpness

@@ -205,3 +205,25 @@ def shade_samples(
     share = 1.0 / float(samples * samples)
     value = wp.vec4(result[0] * share, result[1] * share, result[2] * share, share)
     wp.atomic_add(colour, row // samples, column // samples, value)
+
+
+@wp.kernel(enable_backward=False)
+def develop_pixels(
+    person: wp.array2d(dtype=wp.vec4),
+    behind: wp.array2d(dtype=wp.vec3),
+    noise: wp.array2d(dtype=wp.float32),
+    tone: wp.array(dtype=wp.float32),
+    tone_range: wp.float32,
+    rgb: wp.array3d(dtype=wp.uint8),
+):
+    """Composite linear light and encode it; noise is 1 x 1 where there is none."""
+    i, j = wp.tid()
+    seen, back = person[i, j], behind[i, j]
+    grain = 0.0
+    if noise.shape[0] > 1:
+        grain = noise[i, j]
+    last = tone.shape[0] - 1
+    for k in range(3):
+        light = seen[k] + back[k] * (1.0 - seen[3])
+        index = wp.clamp(int(light * float(last) / tone_range), 0, last)
+        rgb[i, j, k] = wp.uint8(wp.clamp(tone[index] + grain, 0.0, 255.0) + 0.5)
