@@ -54,3 +54,33 @@ def fill(
             # positive floats sort as their bits do: depth above, triangle below
             bits = wp.uint64(wp.cast(z, wp.uint32))
             wp.atomic_min(nearest, y * width + x, (bits << wp.uint64(32)) | wp.uint64(f))
+
+
+@wp.kernel(enable_backward=False)
+def draw_charts(
+    nearest: wp.array(dtype=wp.uint64),
+    screen: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    part: wp.array(dtype=wp.uint8),
+    uv: wp.array2d(dtype=wp.vec2),
+    width: wp.int32,
+    iuv: wp.array2d(dtype=wp.uint8),
+):
+    """Part and chart coordinates of what each pixel centre sees."""
+    i = wp.tid()
+    face = int(wp.uint32(nearest[i] & wp.uint64(0xFFFFFFFF)))
+    if face < 0:
+        return
+    corners = faces[face]
+    a, b, c = screen[corners[0]], screen[corners[1]], screen[corners[2]]
+    px, py = float(i % width) + 0.5, float(i // width) + 0.5
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    wb = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / area
+    wc = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / area
+    wa = (1.0 - wb - wc) / a[2]
+    wb = wb / b[2]
+    wc = wc / c[2]
+    chart = (uv[face, 0] * wa + uv[face, 1] * wb + uv[face, 2] * wc) / (wa + wb + wc)
+    iuv[i, 0] = part[face]
+    iuv[i, 1] = wp.uint8(wp.rint(wp.clamp(chart[0], 0.0, 1.0) * 255.0))
+    iuv[i, 2] = wp.uint8(wp.rint(wp.clamp(chart[1], 0.0, 1.0) * 255.0))

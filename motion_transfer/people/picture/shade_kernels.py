@@ -96,9 +96,7 @@ def _texel(texture: wp.array(dtype=wp.vec4), material: MaterialInput, u: float, 
 
 
 @wp.func
-def _key_share(
-    light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: int
-):
+def _key_share(light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: int):
     """How much of the key lamp a point sees, from 8 places of a disc in the shadow map."""
     p = wp.vec4(point[0], point[1], point[2], 1.0)
     x, y, z = wp.dot(light.shadow_x, p), wp.dot(light.shadow_y, p), wp.dot(light.shadow_z, p)
@@ -116,6 +114,7 @@ def _key_share(
 @wp.kernel(enable_backward=False)
 def shade_samples(
     sample: wp.array(dtype=wp.int32),
+    share: wp.array(dtype=wp.float32),
     seen_face: wp.array(dtype=wp.int32),
     screen: wp.array(dtype=wp.vec3),
     points: wp.array(dtype=wp.vec3),
@@ -214,8 +213,8 @@ def shade_samples(
                 strength = material.gloss * seen * wp.clamp(cosine * 3.0 + 0.6, 0.0, 1.0)
                 highlight += light.colour[k] * (strength * wp.pow(shine, material.sharpness))
         result = wp.cw_mul(albedo, incoming) + highlight
-    share = 1.0 / float(samples * samples)
-    value = wp.vec4(result[0] * share, result[1] * share, result[2] * share, share)
+    part = share[i]
+    value = wp.vec4(result[0] * part, result[1] * part, result[2] * part, part)
     wp.atomic_add(colour, row // samples, column // samples, value)
 
 
