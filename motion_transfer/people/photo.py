@@ -92,7 +92,7 @@ def sample_shot(rng: np.random.Generator, *, framing: Framing | None = None) -> 
         shift=(float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.3, 0.3))),
         light=sample_light(rng),
         background=sample_background(rng),
-        grain=float(LENS_NOISE * rng.random() ** 2),
+        grain=float(LENS_NOISE * max(0.0, rng.uniform(-0.7, 1)) ** 2),
         seed=int(rng.integers(2**32)),
     )
 

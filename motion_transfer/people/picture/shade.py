@@ -33,7 +33,7 @@ from motion_transfer.people.picture.shade_kernels import (
 SAMPLES = 2
 """Samples along each side of a pixel."""
 
-SHADOW_SIZE = 256
+SHADOW_SIZE = 192
 LAMP_DISTANCE_METRES = 1000.0
 """The rasteriser interpolates as a perspective does; from this far it is as good as parallel."""
 
