@@ -34,7 +34,8 @@ def render_video(
 
     Args:
         source: photo; its IUV is looked for beside it unless `source_iuv` is given.
-        driver: folder of IUV images, IUV image, lossless IUV video, `.npy` or `.npz`.
+        driver: folder of IUV images, IUV image, lossless IUV video, `.npy`, `.npz`, or a motion
+            such as `people:walk`.
         output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder of PNG.
         frames: `"10:50"` or `(10, 50)`, half-open.
         frame_rate: frames per second, exact if given as a string or Fraction.

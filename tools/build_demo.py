@@ -18,17 +18,18 @@ from motion_transfer.people.dataset import PeopleStream
 from motion_transfer.people.driver import MotionOptions
 from motion_transfer.people.figure.body import Shape
 from motion_transfer.people.motion.pose_sampler import sample_pose
+from motion_transfer.people.motion.poses import Bend
 from motion_transfer.people.picture.backgrounds import sample_background
 from motion_transfer.people.recording import record_motion
 
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"
-SEED, PERSON = 11, 16
+SEED, PERSON = 11, 8
 SOURCE_SIZE = (512, 768)
 DRIVER = MotionOptions(
     motion="dance",
     frame_count=120,
     frame_rate=Fraction(15),
-    size=(256, 256),
+    size=(320, 320),
     shape=Shape(gender=0.0, muscle=0.6, height=0.55),
 )
 
@@ -39,7 +40,7 @@ def main() -> None:
     shot = replace(
         stream.shot(PERSON, 0),
         framing="full",
-        pose=replace(sample_pose(rng, "standing"), turn=math.radians(12)),
+        pose=replace(sample_pose(rng, "standing"), turn=math.radians(12), head=Bend()),
         background=sample_background(rng, "studio"),
         elevation=0.03,
         distance=5.0,

@@ -1,7 +1,8 @@
-"""Make the README's two pictures from the demo's own files: `python tools/make_figures.py`.
+"""Make the README's pictures: `python tools/make_figures.py` (needs the `people` extra).
 
-`docs/demo.png`: the photo, and the motion over the result at six moments.
+`docs/demo.png`: the demo's photo, and its motion over the result at six moments.
 `docs/how_it_works.png`: what each step of the method hands to the next.
+`docs/people.jpg`: synthetic people with their IUV.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from motion_transfer.media.image import read_photo
 from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.people import PeopleStream
 from motion_transfer.render.completion import complete_texture
 from motion_transfer.render.compose import colour_iuv, paste
 from motion_transfer.render.options import RenderOptions
@@ -24,7 +26,8 @@ from nhrr_core import load_uv_layout
 
 ROOT = Path(__file__).parents[1]
 DEMO = ROOT / "motion_transfer" / "demo"
-MOMENTS = (0, 12, 30, 45, 60, 78)
+MOMENTS = (0, 24, 40, 56, 72, 104)
+PEOPLE_SEED, PEOPLE_ROWS, PEOPLE_COLUMNS = 3, 6, 4
 PANEL_PX = 240
 LABEL_PX = 44
 
@@ -43,7 +46,7 @@ def main() -> None:
         paste(frame, renderer.render(iuv[None])[0], Window(0, 0, iuv.shape[0]))
         results.append(frame)
 
-    cut = [np.s_[:, 28:228]] * len(targets)
+    cut = [np.s_[:, 35:285]] * len(targets)
     rows = [
         np.hstack([colour_iuv(iuv)[c] for iuv, c in zip(targets, cut, strict=True)]),
         np.hstack([frame[c] for frame, c in zip(results, cut, strict=True)]),
@@ -56,6 +59,8 @@ def main() -> None:
         interpolation=cv2.INTER_AREA,
     )
     save(ROOT / "docs" / "demo.png", np.hstack([photo, np.vstack(rows)]))
+
+    save(ROOT / "docs" / "people.jpg", people_sheet())
 
     full = complete_texture(source.texture, source.visibility, load_uv_layout())
     partial = np.where(source.visibility[0, 0, ..., None] > 0, picture(source.texture), 255)
@@ -72,6 +77,17 @@ def main() -> None:
             ]
         ),
     )
+
+
+def people_sheet() -> np.ndarray:
+    """Rows of photos, each with its IUV to the right."""
+    stream = PeopleStream(seed=PEOPLE_SEED, size=(160, 160))
+    cells = []
+    for number in range(PEOPLE_ROWS * PEOPLE_COLUMNS):
+        photo = stream.take(stream.dress(number), stream.shot(number, 0))
+        cells.append(np.hstack([photo.rgb, colour_iuv(photo.iuv)]))
+    rows = [cells[i : i + PEOPLE_COLUMNS] for i in range(0, len(cells), PEOPLE_COLUMNS)]
+    return np.vstack([np.hstack(row) for row in rows])
 
 
 def picture(texture) -> np.ndarray:
@@ -100,7 +116,11 @@ def panel(image: np.ndarray, label: str) -> np.ndarray:
 
 def save(path: Path, image: np.ndarray) -> None:
     path.parent.mkdir(exist_ok=True)
-    Image.fromarray(image).quantize(192, dither=Image.Dither.NONE).save(path, optimize=True)
+    picture = Image.fromarray(image)
+    if path.suffix == ".jpg":
+        picture.save(path, quality=88)
+    else:
+        picture.quantize(192, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"{path}: {image.shape[1]} x {image.shape[0]}, {path.stat().st_size // 1024} KiB")
 
 

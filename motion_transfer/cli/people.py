@@ -21,7 +21,7 @@ def section(heading: str) -> Any:
 
 
 motion_option = section("Motion")
-body_option = section("Body (each 0..1)")
+body_option = section("Body")
 camera_option = section("Camera")
 people_option = section("People")
 picture_option = section("Pictures")
@@ -42,22 +42,32 @@ def people() -> None:
 @people.command(cls=SectionCommand)
 @click.argument("motion", metavar="MOTION|FILE.bvh")
 @motion_option(
-    "--frames", "frame_count", type=int, help="Default: one loop at its pace, or the whole file."
+    "--frames",
+    "frame_count",
+    type=int,
+    metavar="N",
+    help="Default: one loop at its pace, or the whole file.",
 )
 @motion_option("--fps", default="30", metavar="RATE", help="Such as 25 or 30000/1001; default 30.")
 @motion_option("--travel", is_flag=True, help="Go where a BVH file goes, not on the spot.")
-@body_option("--gender", type=SHARE, help="0 male, 1 female.")
-@body_option("--age", type=SHARE, help="0.67 young adult, 1 old.")
-@body_option("--height", type=SHARE, help="Short to tall.")
-@body_option("--weight", type=SHARE, help="Thin to heavy.")
-@body_option("--muscle", type=SHARE, help="Slack to muscular.")
-@body_option("--proportions", type=SHARE, help="Uncommon to ideal.")
+@body_option("--gender", type=SHARE, metavar="0..1", help="0 male, 1 female.")
+@body_option("--age", type=SHARE, metavar="0..1", help="0.67 young adult, 1 old.")
+@body_option("--height", type=SHARE, metavar="0..1", help="Short to tall.")
+@body_option("--weight", type=SHARE, metavar="0..1", help="Thin to heavy.")
+@body_option("--muscle", type=SHARE, metavar="0..1", help="Slack to muscular.")
+@body_option("--proportions", type=SHARE, metavar="0..1", help="Uncommon to ideal.")
 @camera_option(
     "--framing", default="full", metavar="PART", help="full (default), three-quarters or upper."
 )
-@camera_option("--azimuth", type=float, default=0.0, help="Degrees around, to the person's left.")
-@camera_option("--elevation", type=float, default=4.0, help="Degrees up; default 4.")
-@camera_option("--distance", type=float, default=4.0, help="Metres; default 4.")
+@camera_option(
+    "--azimuth",
+    type=float,
+    metavar="DEGREES",
+    default=0.0,
+    help="Around, to the person's left; default 0.",
+)
+@camera_option("--elevation", type=float, metavar="DEGREES", default=4.0, help="Up; default 4.")
+@camera_option("--distance", type=float, metavar="METRES", default=4.0, help="Default 4.")
 @output_option("--size", default="512x512", metavar="WxH", help="Pixels; default 512x512.")
 @output_option(
     "-o", "--output", type=FILE, required=True, help="A folder for PNG, or a lossless .mkv."
@@ -103,9 +113,9 @@ def drive(
 
 
 @people.command(cls=SectionCommand)
-@people_option("--count", type=int, required=True, help="How many people.")
-@people_option("--views", type=int, default=2, help="Photos of each; default 2.")
-@people_option("--seed", type=int, default=0, help="Same seed, same bytes; default 0.")
+@people_option("--count", type=int, metavar="N", required=True, help="How many people.")
+@people_option("--views", type=int, metavar="N", default=2, help="Photos of each; default 2.")
+@people_option("--seed", type=int, metavar="N", default=0, help="Same seed, same bytes; default 0.")
 @people_option(
     "--split", default="train", metavar="NAME", help="train (default) or held-out: never the same."
 )
@@ -113,7 +123,7 @@ def drive(
 @picture_option("--framing", metavar="PART", help="full, three-quarters or upper; default: mixed.")
 @picture_option("--noise", is_flag=True, help="Put DensePose's usual faults into the IUV.")
 @output_option("-o", "--out", type=FILE, required=True, help="A folder; completed if it has some.")
-@output_option("--workers", type=int, help="Processes; default: one for each core.")
+@output_option("--workers", type=int, metavar="N", help="Processes; default: one for each core.")
 @output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def render(quiet: bool, size: str, **options: Any) -> None:
     """Photograph synthetic people into a folder.
@@ -134,7 +144,8 @@ def render(quiet: bool, size: str, **options: Any) -> None:
         added = write_album(settings, bar.advance)
     if not quiet:
         there = f" ({settings.count - added} were there)" if added < settings.count else ""
-        click.echo(f"{settings.out}: {added} people added{there}, {settings.views} photos each")
+        who = "person" if added == 1 else "people"
+        click.echo(f"{settings.out}: {added} {who} added{there}, {settings.views} photos each")
 
 
 BODY_OPTIONS = ("gender", "age", "height", "weight", "muscle", "proportions")

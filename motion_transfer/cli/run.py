@@ -45,7 +45,8 @@ output_option = section("Output")
     "--driver",
     type=FILE,
     required=True,
-    help="Folder of IUV images, one IUV image, lossless IUV video, .npy or .npz.",
+    help="Folder of IUV images, one IUV image, lossless IUV video, .npy, .npz, or people:MOTION"
+    " (such as people:walk,frames=60; see `mt people drive -h`).",
 )
 @driver_option(
     "--driver-person", default="largest", metavar="WHO", help="Whom to follow; as --person."

@@ -10,14 +10,20 @@ from importlib.util import find_spec
 
 from motion_transfer.errors import InputError
 
+PEOPLE_EXTRA = "motion-transfer[people]"
+
+
+def missing_packages() -> list[str]:
+    """What synthetic people need and is not installed."""
+    return [name for name in ("anny", "warp") if find_spec(name) is None]
+
 
 def require_people() -> None:
     """Raises: InputError with the command that installs what synthetic people need."""
-    missing = [name for name in ("anny", "warp") if find_spec(name) is None]
-    if missing:
+    if missing := missing_packages():
         raise InputError(
             f"synthetic people need {' and '.join(missing)}, which is not installed;"
-            " pip install 'motion-transfer[people]'"
+            f" pip install '{PEOPLE_EXTRA}'"
         )
 
 

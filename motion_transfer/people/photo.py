@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import UInt8
 
 from motion_transfer.people.figure.body import BodyModel
 from motion_transfer.people.figure.camera import Camera
@@ -21,13 +21,13 @@ from motion_transfer.people.picture.backgrounds import (
     paint_background,
     sample_background,
 )
+from motion_transfer.people.picture.develop import develop
 from motion_transfer.people.picture.ground import floor_shadow
 from motion_transfer.people.picture.iuv_noise import IuvNoise, add_iuv_noise
 from motion_transfer.people.picture.light import Light, sample_light
-from motion_transfer.people.picture.shade import Shading
 
 FRAMING_SHARES: dict[Framing, float] = {"full": 0.6, "three-quarters": 0.25, "upper": 0.15}
-FRAMED_STEP = 5
+FRAMED_STEP = 11
 """One in so many vertices is enough to point a camera by."""
 
 LENS_NOISE = 0.006
@@ -92,7 +92,7 @@ def sample_shot(rng: np.random.Generator, *, framing: Framing | None = None) -> 
         shift=(float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.3, 0.3))),
         light=sample_light(rng),
         background=sample_background(rng),
-        grain=float(LENS_NOISE * rng.random() ** 2),
+        grain=float(LENS_NOISE * max(0.0, rng.uniform(-0.7, 1)) ** 2),
         seed=int(rng.integers(2**32)),
     )
 
@@ -141,40 +141,3 @@ class Photographer:
         if noise is not None:
             iuv = add_iuv_noise(iuv, noise, rng)
         return PersonPhoto(rgb, alpha, iuv, camera)
-
-
-def develop(
-    seen: Shading,
-    behind: Float32[np.ndarray, "H W 3"],
-    grain: float,
-    rng: np.random.Generator,
-) -> UInt8[np.ndarray, "H W 3"]:
-    """The person in front of a background as 8-bit sRGB; what is too bright rolls off softly.
-
-    Args:
-        behind: linear RGB.
-        grain: sensor noise, standard deviation as a share of white.
-    """
-    linear = seen.colour + behind * (1 - seen.coverage[..., None])
-    np.minimum(linear, TONE_RANGE, out=linear)
-    linear *= (len(_TONE) - 1) / TONE_RANGE
-    tone = np.take(_TONE, linear.astype(np.int32))
-    if grain > 0:
-        tone += rng.standard_normal(tone.shape[:2], np.float32)[..., None] * (255 * grain)
-        np.clip(tone, 0, 255, out=tone)
-    return (tone + 0.5).astype(np.uint8)
-
-
-TONE_RANGE = 2.0
-
-
-def _tone_curve() -> Float32[np.ndarray, " N"]:
-    """sRGB value (0..255) of linear light from 0 to TONE_RANGE, bent above 0.8."""
-    light = np.linspace(0, TONE_RANGE, 8192)
-    knee = 0.8
-    bent = np.where(light < knee, light, 1 - (1 - knee) * np.exp(-(light - knee) / (1 - knee)))
-    encoded = np.where(bent <= 0.0031308, 12.92 * bent, 1.055 * bent ** (1 / 2.4) - 0.055)
-    return (255 * encoded).astype(np.float32)
-
-
-_TONE = _tone_curve()

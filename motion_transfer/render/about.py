@@ -18,6 +18,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.image import read_photo
 from motion_transfer.media.iuv_image import CHANNEL_ORDERS, IUV_SUFFIXES
 from motion_transfer.media.iuv_stream import IuvReader, open_reader, open_stream
+from motion_transfer.people.extra import PEOPLE_EXTRA, missing_packages
 from motion_transfer.render.neural_renderer import choose_dtype
 from motion_transfer.render.person import find_people
 from motion_transfer.version import __version__
@@ -59,6 +60,7 @@ def describe_setup() -> Facts:
             "texture": "ready (default; a draft, no weights)",
             "nhrr": "with --weights FILE",
         },
+        "people": f"pip install '{PEOPLE_EXTRA}'" if missing_packages() else "installed",
         "weights": "none ship yet",
         "presets": {name: describe_preset(config) for name, config in PRESETS.items()},
     }

@@ -34,7 +34,8 @@ class RenderOptions:
 
     Attributes:
         source, source_iuv: the photo and its IUV; None means: look beside the photo.
-        driver: a folder of IUV images, one IUV image, a lossless IUV video, `.npy` or `.npz`.
+        driver: a folder of IUV images, one IUV image, a lossless IUV video, `.npy`, `.npz`, or a
+            motion, `people:walk` (see `people.stream`).
         output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder.
         renderer: `texture` (no weights) or `nhrr` (the network); None: `nhrr` if weights are given.
         weights: a safetensors checkpoint, for `nhrr`.

@@ -26,7 +26,15 @@ def start(studio, *more: object) -> subprocess.Popen[str]:
         *("--missing", "hold", "-o", studio.folder / "new/out.mp4", "--json", *more),
     ]
     command = [sys.executable, "-m", "motion_transfer", *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        command, stdout=pipe, stderr=pipe, text=True, preexec_fn=heed_interrupts
+    )
+
+
+def heed_interrupts() -> None:
+    """Ctrl-C works even where the tests themselves run in the background, which ignores it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def wait_for(process: subprocess.Popen[str], stage: str) -> None:

@@ -39,7 +39,7 @@ def test_render_then_run_on_one_of_them(mt, studio):
     out = studio.folder / "people"
     done = mt("people", "render", "--count", 1, "--size", "96x128", "--out", out, "--workers", 1)
     assert (done.code, done.err) == (0, "")
-    assert done.out == f"{out}: 1 people added, 2 photos each\n"
+    assert done.out == f"{out}: 1 person added, 2 photos each\n"
     again = mt("people", "render", "--count", 1, "--size", "96x128", "--out", out)
     assert again.out == f"{out}: 0 people added (1 were there), 2 photos each\n"
     picture = studio.folder / "same.png"

@@ -30,7 +30,11 @@ from motion_transfer.people.clothes.wardrobe import Outfit, Shoes, Skirt, Top, T
 from motion_transfer.people.figure.body import Body, BodyModel, Points
 from motion_transfer.people.figure.mesh import Material, Piece
 
-_MARGIN = 0.007  # skin reaches this far into a close garment
+_OVERLAP = 0.08
+"""How far trousers and skirts go on under a hem, metres: it rises when arms do."""
+
+_MARGIN = 0.007  # skin reaches this far into a close garment, metres
+_SKIRT_MARGIN = 0.03  # and into a skirt, whose band may lie a little lower than on the template
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,7 @@ class _Dresser:
             keep = np.minimum(keep, 0.02 - shaft)
         top = self.outfit.top
         if top and not self.outfit.tucked:
-            keep = np.minimum(keep, 0.04 - cuts.top_depth(top, at, self.levels))
+            keep = np.minimum(keep, _OVERLAP - cuts.top_depth(top, at, self.levels))
         texture, size = bottom_panel(trousers, pattern, self.levels, keep)
         return self.piece("trousers", pattern, points, keep, texture, size, trousers.gloss)
 
@@ -164,10 +168,10 @@ class _Dresser:
             low = 9.0
         shape = shape_skirt(skirt, self.fitting, 0.0, low)
         body = cuts.skirt_depth(skirt, self.skin, self.levels)
-        self.keep = np.minimum(self.keep, _MARGIN - body)
+        self.keep = np.minimum(self.keep, _SKIRT_MARGIN - body)
         keep = np.ones(ROWS * COLUMNS, np.float32)
         if top and not self.outfit.tucked and not self.outfit.is_dress:
-            over = self.levels.waist + skirt.top - (self.levels.crotch + top.hem) - 0.05
+            over = self.levels.waist + skirt.top - (self.levels.crotch + top.hem) - _OVERLAP
             keep = np.repeat(shape.down - np.float32(over), COLUMNS)
         return self.tube(name, skirt, shape, keep)
 

@@ -18,7 +18,7 @@ from motion_transfer.people.clothes.cuts import Places
 from motion_transfer.people.clothes.surface import BodySurface, Limb, along_polyline
 from motion_transfer.people.figure.body import Faces, Points, SkinWeights
 
-TEXELS_PER_METRE = 270.0
+TEXELS_PER_METRE = 230.0
 _FRONT_TO_BACK = -0.02  # y of the seam on the shoulders and at the sides
 
 

@@ -68,7 +68,7 @@ def shoe_pieces(shoes: Shoes, surface: BodySurface, body: Body) -> list[Piece]:
     foot = surface.is_limb(Limb.FOOT_L) & (surface.z < _TOP)
     own = body.points[foot]
     scale = body.height / surface.model.template.height
-    points = hull(own, 0.012 * scale, np.array([0.5, 1.0, 0.5], np.float32))
+    points = hull(own[::3], 0.012 * scale, np.array([0.5, 1.0, 0.5], np.float32))
     low = float(own[:, 2].min())
     # everything near the ground goes straight down to the sole
     ground = low - 0.012 * scale

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+import warp as wp
+from jaxtyping import UInt8
 
 from motion_transfer.people.figure.body import Faces, Points
 from motion_transfer.people.figure.camera import Camera
 from motion_transfer.people.figure.charts import BodyCharts
-from motion_transfer.people.figure.rasterise import Triangles, rasterise, triangle_ids
+from motion_transfer.people.figure.raster_kernels import draw_charts
+from motion_transfer.people.figure.rasterise import Triangles, rasterise, share_array
 
 
 def render_iuv(
@@ -22,32 +24,17 @@ def render_iuv(
     Returns: (I, U, V) at pixel centres; 0 where nobody is.
     """
     screen = camera.project(points)
-    nearest = rasterise(screen, Triangles(faces), camera.width, camera.height)
-    face = triangle_ids(nearest)
-    pixel = np.flatnonzero(face >= 0)
-    face = face[pixel]
-    weights = barycentric(screen[faces[face]], pixel, camera.width)
-    chart = np.einsum("pk,pkc->pc", weights, charts.uv[face])
+    triangles = Triangles(faces)
+    nearest = rasterise(screen, triangles, camera.width, camera.height)
     iuv = np.zeros((camera.height * camera.width, 3), np.uint8)
-    iuv[pixel, 0] = charts.part[face]
-    iuv[pixel, 1:] = np.rint(np.clip(chart, 0, 1) * 255)
+    inputs = [
+        share_array(nearest, wp.uint64),
+        share_array(screen, wp.vec3),
+        triangles.arrays[0],
+        share_array(charts.part, wp.uint8),
+        share_array(charts.uv, wp.vec2),
+        camera.width,
+    ]
+    outputs = [share_array(iuv, wp.uint8)]
+    wp.launch(draw_charts, len(nearest), inputs=inputs, outputs=outputs, device="cpu")
     return iuv.reshape(camera.height, camera.width, 3)
-
-
-def barycentric(
-    corners: Float32[np.ndarray, "P 3 3"], pixel: np.ndarray, width: int
-) -> Float32[np.ndarray, "P 3"]:
-    """Where pixel centres lie in their triangles, seen in perspective.
-
-    Args:
-        corners: each pixel's triangle on the picture plane: three corners of x, y, depth.
-        pixel: indices, row by row, in a picture of that width.
-    """
-    centre = np.stack([pixel % width + 0.5, pixel // width + 0.5], 1).astype(np.float32)
-    (a, b, c), (za, zb, zc) = corners[..., :2].transpose(1, 0, 2), corners[..., 2].T
-    ab, ac, ap = b - a, c - a, centre - a
-    area = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1]
-    wb = (ap[:, 0] * ac[:, 1] - ac[:, 0] * ap[:, 1]) / area
-    wc = (ab[:, 0] * ap[:, 1] - ap[:, 0] * ab[:, 1]) / area
-    weights = np.stack([(1 - wb - wc) / za, wb / zb, wc / zc], 1)
-    return weights / weights.sum(1, keepdims=True)

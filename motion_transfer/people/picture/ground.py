@@ -10,7 +10,7 @@ from motion_transfer.people.figure.body import Points
 from motion_transfer.people.figure.camera import Camera
 from motion_transfer.people.picture.light import Light
 
-CELL_METRES = 0.02
+CELL_METRES = 0.03
 REACH_METRES = 1.3
 CONTACT_METRES = 0.1
 """Below this height a body keeps ambient light off the floor as well."""

@@ -25,6 +25,13 @@ SHADOW_DISC = wp.constant(
 )
 """Eight places spread evenly over a disc of radius 1."""
 
+SPINS = wp.constant(
+    wp.types.matrix((16, 2), wp.float32)(
+        *(float(turn(np.pi * k / 8)) for k in range(16) for turn in (np.cos, np.sin))
+    )
+)
+"""Sixteen turns of that disc."""
+
 
 @wp.struct
 class LightInput:
@@ -89,13 +96,11 @@ def _texel(texture: wp.array(dtype=wp.vec4), material: MaterialInput, u: float, 
 
 
 @wp.func
-def _key_share(
-    light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: float
-):
+def _key_share(light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: int):
     """How much of the key lamp a point sees, from 8 places of a disc in the shadow map."""
     p = wp.vec4(point[0], point[1], point[2], 1.0)
     x, y, z = wp.dot(light.shadow_x, p), wp.dot(light.shadow_y, p), wp.dot(light.shadow_z, p)
-    cosine, sine = light.softness_px * wp.cos(spin), light.softness_px * wp.sin(spin)
+    cosine, sine = light.softness_px * SPINS[spin, 0], light.softness_px * SPINS[spin, 1]
     open_taps = 0.0
     for k in range(8):
         dx, dy = SHADOW_DISC[k, 0], SHADOW_DISC[k, 1]
@@ -109,6 +114,7 @@ def _key_share(
 @wp.kernel(enable_backward=False)
 def shade_samples(
     sample: wp.array(dtype=wp.int32),
+    share: wp.array(dtype=wp.float32),
     seen_face: wp.array(dtype=wp.int32),
     screen: wp.array(dtype=wp.vec3),
     points: wp.array(dtype=wp.vec3),
@@ -174,8 +180,8 @@ def shade_samples(
                 slope_v = (below[3] - texel[3]) / (dv * material.size[1])
                 normal = wp.normalize(normal - along_u * slope_u - along_v * slope_v)
 
-        # turned by a different angle at every sample, so that 8 taps make no bands
-        spin = 6.2831853 * wp.frac(0.7548777 * float(column) + 0.5698403 * float(row))
+        # turned by a different angle at neighbouring samples, so that 8 taps make no bands
+        spin = (column * 7 + row * 11) % 16
         # light that scatters in flesh gets around its own edge
         inside = light.toward[0] * (material.translucency * SCATTER_METRES)
         outside = point + normal * SHADOW_BIAS_METRES + inside
@@ -185,14 +191,19 @@ def shade_samples(
         incoming = (light.ground * (1.0 - upward) + light.sky * upward) * open_share
         highlight = wp.vec3(0.0, 0.0, 0.0)
         wrap = WRAP_TINT * material.translucency
-        one = wp.vec3(1.0, 1.0, 1.0)
+        less = wp.vec3(1.0 / (1.0 + wrap[0]), 1.0 / (1.0 + wrap[1]), 1.0 / (1.0 + wrap[2]))
         for k in range(light.lamps):
             toward = light.toward[k]
-            seen = wp.where(k == 0, key, open_share)
+            seen = open_share
+            if k == 0:
+                seen = key
             cosine = wp.dot(normal, toward)
-            bent = wp.cw_div(one * cosine + wrap, one + wrap)
-            bent = wp.vec3(wp.max(bent[0], 0.0), wp.max(bent[1], 0.0), wp.max(bent[2], 0.0))
-            incoming += wp.cw_mul(light.colour[k], bent) * seen
+            if material.translucency > 0.0:
+                bent = wp.cw_mul(wp.vec3(cosine, cosine, cosine) + wrap, less)
+                bent = wp.max(bent, wp.vec3(0.0, 0.0, 0.0))
+                incoming += wp.cw_mul(light.colour[k], bent) * seen
+            elif cosine > 0.0:
+                incoming += light.colour[k] * (cosine * seen)
             if material.gloss > 0.0 and cosine > -0.2:
                 half = wp.normalize(toward + view)
                 shine = wp.max(wp.dot(normal, half), 0.0)
@@ -202,6 +213,28 @@ def shade_samples(
                 strength = material.gloss * seen * wp.clamp(cosine * 3.0 + 0.6, 0.0, 1.0)
                 highlight += light.colour[k] * (strength * wp.pow(shine, material.sharpness))
         result = wp.cw_mul(albedo, incoming) + highlight
-    share = 1.0 / float(samples * samples)
-    value = wp.vec4(result[0] * share, result[1] * share, result[2] * share, share)
+    part = share[i]
+    value = wp.vec4(result[0] * part, result[1] * part, result[2] * part, part)
     wp.atomic_add(colour, row // samples, column // samples, value)
+
+
+@wp.kernel(enable_backward=False)
+def develop_pixels(
+    person: wp.array2d(dtype=wp.vec4),
+    behind: wp.array2d(dtype=wp.vec3),
+    noise: wp.array2d(dtype=wp.float32),
+    tone: wp.array(dtype=wp.float32),
+    tone_range: wp.float32,
+    rgb: wp.array3d(dtype=wp.uint8),
+):
+    """Composite linear light and encode it; noise is 1 x 1 where there is none."""
+    i, j = wp.tid()
+    seen, back = person[i, j], behind[i, j]
+    grain = 0.0
+    if noise.shape[0] > 1:
+        grain = noise[i, j]
+    last = tone.shape[0] - 1
+    for k in range(3):
+        light = seen[k] + back[k] * (1.0 - seen[3])
+        index = wp.clamp(int(light * float(last) / tone_range), 0, last)
+        rgb[i, j, k] = wp.uint8(wp.clamp(tone[index] + grain, 0.0, 255.0) + 0.5)

@@ -57,7 +57,7 @@ def test_alpha_iuv_and_photo_agree():
         assert photo.rgb.shape == (*SIZE[::-1], 3) == photo.iuv.shape
         body = photo.iuv[..., 0] > 0
         assert 0.03 < body.mean() < 0.9
-        assert (photo.alpha[body] == 255).mean() > 0.97  # the body is never in front of its clothes
+        assert (photo.alpha[body] > 0).all()  # the body is never outside of the person
         assert ((photo.alpha > 0) & ~body).any()  # cloth and hair reach beyond it
         assert not photo.iuv[~body].any()
 

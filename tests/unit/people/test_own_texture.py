@@ -12,8 +12,10 @@ import pytest
 pytest.importorskip("warp", reason="needs the `people` extra")
 pytestmark = pytest.mark.usefixtures("body_model")
 
+from reference.people_iuv import barycentric  # noqa: E402
+
 from motion_transfer.people.figure.charts import load_charts  # noqa: E402
-from motion_transfer.people.figure.exact_iuv import barycentric, render_iuv  # noqa: E402
+from motion_transfer.people.figure.exact_iuv import render_iuv  # noqa: E402
 from motion_transfer.people.figure.framing import frame_points  # noqa: E402
 from motion_transfer.people.figure.mesh import Material, Piece  # noqa: E402
 from motion_transfer.people.figure.rasterise import Triangles, rasterise, triangle_ids  # noqa: E402

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from motion_transfer.people.clothes import cuts
 from motion_transfer.people.clothes.fabrics import Fabric
 from motion_transfer.people.clothes.fit import Fitting
 from motion_transfer.people.clothes.garments import dress_body
@@ -29,7 +30,6 @@ from motion_transfer.people.clothes.wardrobe import (
     Skirt,
     Top,
     Trousers,
-    cuts,
 )
 from motion_transfer.people.figure.body import Shape
 from motion_transfer.people.figure.mesh import PosedBody

@@ -7,8 +7,10 @@ import pytest
 
 pytest.importorskip("warp", reason="needs the `people` extra")
 
+from reference.people_iuv import barycentric, reference_iuv
+
 from motion_transfer.people.figure.charts import load_charts
-from motion_transfer.people.figure.exact_iuv import barycentric, render_iuv
+from motion_transfer.people.figure.exact_iuv import render_iuv
 from motion_transfer.people.figure.framing import frame_points
 
 HAND_RIGHT, HAND_LEFT, FOOT_LEFT, FOOT_RIGHT, HEAD_RIGHT, HEAD_LEFT = 3, 4, 5, 6, 23, 24
@@ -54,6 +56,16 @@ def test_charts_change_smoothly_within_a_part(body_model):
     same = (iuv[:, 1:, 0] == iuv[:, :-1, 0]) & (iuv[:, 1:, 0] == TORSO_FRONT)
     steps = np.abs(np.diff(iuv, axis=1))[same][:, 1:]
     assert np.median(steps.max(1)) <= 6  # of 255, a pixel apart
+
+
+def test_equals_the_reference(body_model):
+    body = body_model.template
+    camera = frame_points(body.points, (192, 256), distance=2.0, azimuth=0.7, elevation=0.4)
+    arguments = (body.points, body_model.faces, load_charts(), camera)
+    ours, reference = render_iuv(*arguments).astype(int), reference_iuv(*arguments)
+    assert (ours[..., 0] == reference[..., 0]).all()
+    assert np.abs(ours - reference).max() <= 1  # float32 in another order may round otherwise
+    assert (ours != reference).mean() < 1e-3
 
 
 def test_barycentric_weights_lead_back_to_the_pixel():
