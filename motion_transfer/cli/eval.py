@@ -8,11 +8,13 @@ from typing import Any
 
 import click
 
+from motion_transfer.cli.people import prepare_body_model
 from motion_transfer.cli.progress import CountBar
 from motion_transfer.cli.sections import SectionOption, WordsCommand
 from motion_transfer.errors import InputError
 
 FILE = click.Path(path_type=Path)
+HELD_OUT_PAIRS = 500
 
 
 def section(heading: str) -> Any:
@@ -20,7 +22,7 @@ def section(heading: str) -> Any:
     return partial(click.option, cls=SectionOption, section=heading)
 
 
-pairs_option = section("Pairs (one of --pairs and --clips)")
+pairs_option = section("Pairs (one of --pairs, --clips and --protocol)")
 method_option = section("Methods to compare (any number, of any kind)")
 protocol_option = section("Protocol (numbers are comparable only where it is the same)")
 output_option = section("Output")
@@ -38,6 +40,12 @@ compare_option = section("Earlier results")
     "--clips",
     type=FILE,
     help="Folder of videos, NAME.mp4 with NAME_iuv/ or NAME_IUV.mkv: frames of a clip are paired.",
+)
+@pairs_option(
+    "--protocol",
+    "people",
+    type=click.Choice(["people"]),
+    help="The built-in set: synthetic people on whom nothing is ever trained; 500 unless --limit.",
 )
 @pairs_option(
     "--moments", type=int, default=8, help="Target moments a clip, two frames each; default 8."
@@ -102,6 +110,7 @@ def eval_(compare: tuple[Path, ...], **options: Any) -> None:
     mt eval --pairs pairs.csv --images photos/ --weights a.safetensors b.safetensors \\
             --results CBI/ DSC/ -o table1/
     mt eval --clips fashion/ --weights a.safetensors -o videos/
+    mt eval --protocol people --weights a.safetensors --renderer texture -o people/
     mt eval --compare table1/results.json later/results.json
     """
     if compare:
@@ -111,8 +120,8 @@ def eval_(compare: tuple[Path, ...], **options: Any) -> None:
         return
     if options["output"] is None:
         raise click.UsageError("Missing option '-o' / '--output'.")
-    if (options["pairs"] is None) == (options["clips"] is None):
-        raise click.UsageError("Give one of --pairs and --clips.")
+    if sum(options[name] is not None for name in ("pairs", "clips", "people")) != 1:
+        raise click.UsageError("Give one of --pairs, --clips and --protocol.")
     _evaluate(**options)
 
 
@@ -148,7 +157,7 @@ def _evaluate(*, output: Path, quiet: bool, as_json: bool, **options: Any) -> No
         has_clips=has_clips,
     )
     with CountBar("looking at the pairs", unit="picture", quiet=quiet) as bar:
-        pairs = _open_pairs(options, bar.advance)
+        pairs = _open_pairs(options, bar.advance, quiet)
 
     def note(words: str) -> None:
         if not quiet:
@@ -171,10 +180,11 @@ def _evaluate(*, output: Path, quiet: bool, as_json: bool, **options: Any) -> No
         )
 
 
-def _open_pairs(options: dict[str, Any], done: Any) -> Any:
+def _open_pairs(options: dict[str, Any], done: Any, quiet: bool) -> Any:
     from motion_transfer.media.iuv_image import CHANNEL_ORDERS
     from motion_transfer.training.clips import open_clip_pairs
     from motion_transfer.training.pairs import open_pairs
+    from motion_transfer.training.streamed import held_out_pairs
 
     if options["iuv_order"] not in (None, *CHANNEL_ORDERS):
         raise InputError(
@@ -184,6 +194,9 @@ def _open_pairs(options: dict[str, Any], done: Any) -> Any:
         if options[name] is not None and options[name] < 1:
             raise InputError(f"{name} is {options[name]}; it must be at least 1")
     common = {name: options[name] for name in ("iuv_order", "limit", "skip_broken")}
+    if options["people"] is not None:
+        prepare_body_model(quiet)
+        return held_out_pairs(options["limit"] or HELD_OUT_PAIRS)
     if options["clips"] is not None:
         return open_clip_pairs(options["clips"], moments=options["moments"], done=done, **common)
     return open_pairs(options["pairs"], options["images"], done=done, **common)
