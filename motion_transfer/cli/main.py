@@ -74,10 +74,10 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo(f"mt: {error}", err=True)
         return error.exit_code
     except Terminated:
-        click.echo("mt: terminated, nothing was left behind", err=True)
+        click.echo("mt: terminated, nothing half-written was left behind", err=True)
         return TERMINATED
     except (KeyboardInterrupt, click.Abort):
-        click.echo("mt: interrupted, nothing was left behind", err=True)
+        click.echo("mt: interrupted, nothing half-written was left behind", err=True)
         return INTERRUPTED
     return code if isinstance(code, int) else 0  # click returns the code of an early exit
 

@@ -65,7 +65,7 @@ def test_nothing_is_left_behind(studio, number: int, code: int, word: str, stage
         process.send_signal(number)
         _, errors = process.communicate(timeout=60)
     assert process.returncode == code
-    assert errors.splitlines()[-1] == f"mt: {word}, nothing was left behind"
+    assert errors.splitlines()[-1] == f"mt: {word}, nothing half-written was left behind"
     assert "Traceback" not in errors
     assert set(studio.folder.rglob("*")) == before
 
