@@ -200,10 +200,10 @@ def test_missing_results_are_listed_or_their_pairs_skipped_for_all(
 
 BAD = {
     "no output": (["--pairs", "pairs.csv"], "Missing option '-o'"),
-    "no pairs": (["-o", "out"], "Give one of --pairs and --clips"),
+    "no pairs": (["-o", "out"], "Give one of --pairs, --clips and --protocol"),
     "both": (
         ["-o", "out", "--pairs", "pairs.csv", "--clips", "."],
-        "Give one of --pairs and --clips",
+        "Give one of --pairs, --clips and --protocol",
     ),
     "no method": (["-o", "out", "--pairs", "pairs.csv"], "nothing to evaluate; give --weights"),
     "renderer unknown": (

@@ -56,6 +56,16 @@ def fill(
             wp.atomic_min(nearest, y * width + x, (bits << wp.uint64(32)) | wp.uint64(f))
 
 
+@wp.func
+def perspective_weights(a: wp.vec3, b: wp.vec3, c: wp.vec3, px: float, py: float):
+    """Barycentric weights of a place on the picture, as on the triangle in space."""
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    wb = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / area
+    wc = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / area
+    weights = wp.vec3((1.0 - wb - wc) / a[2], wb / b[2], wc / c[2])
+    return weights / (weights[0] + weights[1] + weights[2])
+
+
 @wp.kernel(enable_backward=False)
 def draw_charts(
     nearest: wp.array(dtype=wp.uint64),
@@ -73,14 +83,8 @@ def draw_charts(
         return
     corners = faces[face]
     a, b, c = screen[corners[0]], screen[corners[1]], screen[corners[2]]
-    px, py = float(i % width) + 0.5, float(i // width) + 0.5
-    area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-    wb = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / area
-    wc = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / area
-    wa = (1.0 - wb - wc) / a[2]
-    wb = wb / b[2]
-    wc = wc / c[2]
-    chart = (uv[face, 0] * wa + uv[face, 1] * wb + uv[face, 2] * wc) / (wa + wb + wc)
+    w = perspective_weights(a, b, c, float(i % width) + 0.5, float(i // width) + 0.5)
+    chart = uv[face, 0] * w[0] + uv[face, 1] * w[1] + uv[face, 2] * w[2]
     iuv[i, 0] = part[face]
     iuv[i, 1] = wp.uint8(wp.rint(wp.clamp(chart[0], 0.0, 1.0) * 255.0))
     iuv[i, 2] = wp.uint8(wp.rint(wp.clamp(chart[1], 0.0, 1.0) * 255.0))

@@ -4,6 +4,7 @@ import numpy as np
 import warp as wp
 
 from motion_transfer.people.extra import start_warp
+from motion_transfer.people.figure.raster_kernels import perspective_weights
 
 start_warp()
 
@@ -111,6 +112,46 @@ def _key_share(light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: w
     return open_taps
 
 
+@wp.func
+def _lit(
+    albedo: wp.vec3,
+    normal: wp.vec3,
+    view: wp.vec3,
+    along_v: wp.vec3,
+    key: float,
+    open_share: float,
+    material: MaterialInput,
+    light: LightInput,
+):
+    """What a surface sends to the camera: `key` of the first lamp and `open_share` of the rest."""
+    upward = 0.5 + 0.5 * normal[2]
+    incoming = (light.ground * (1.0 - upward) + light.sky * upward) * open_share
+    highlight = wp.vec3(0.0, 0.0, 0.0)
+    wrap = WRAP_TINT * material.translucency
+    less = wp.vec3(1.0 / (1.0 + wrap[0]), 1.0 / (1.0 + wrap[1]), 1.0 / (1.0 + wrap[2]))
+    for k in range(light.lamps):
+        toward = light.toward[k]
+        seen = open_share
+        if k == 0:
+            seen = key
+        cosine = wp.dot(normal, toward)
+        if material.translucency > 0.0:
+            bent = wp.cw_mul(wp.vec3(cosine, cosine, cosine) + wrap, less)
+            bent = wp.max(bent, wp.vec3(0.0, 0.0, 0.0))
+            incoming += wp.cw_mul(light.colour[k], bent) * seen
+        elif cosine > 0.0:
+            incoming += light.colour[k] * (cosine * seen)
+        if material.gloss > 0.0 and cosine > -0.2:
+            half = wp.normalize(toward + view)
+            shine = wp.max(wp.dot(normal, half), 0.0)
+            if material.sheen_along_v != 0:
+                across = wp.dot(along_v, half)
+                shine = wp.sqrt(wp.max(1.0 - across * across, 0.0))
+            strength = material.gloss * seen * wp.clamp(cosine * 3.0 + 0.6, 0.0, 1.0)
+            highlight += light.colour[k] * (strength * wp.pow(shine, material.sharpness))
+    return wp.cw_mul(albedo, incoming) + highlight
+
+
 @wp.kernel(enable_backward=False)
 def shade_samples(
     sample: wp.array(dtype=wp.int32),
@@ -136,18 +177,8 @@ def shade_samples(
     row, column = sample[i] // width, sample[i] % width
     corners = faces[face]
     sa, sb, sc = screen[corners[0]], screen[corners[1]], screen[corners[2]]
-    px, py = float(column) + 0.5, float(row) + 0.5
-    area = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
-    wb = ((px - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (py - sa[1])) / area
-    wc = ((sb[0] - sa[0]) * (py - sa[1]) - (px - sa[0]) * (sb[1] - sa[1])) / area
-    wa = (1.0 - wb - wc) / sa[2]
-    wb = wb / sb[2]
-    wc = wc / sc[2]
-    total = wa + wb + wc
-    wa = wa / total
-    wb = wb / total
-    wc = wc / total
-
+    w = perspective_weights(sa, sb, sc, float(column) + 0.5, float(row) + 0.5)
+    wa, wb, wc = w[0], w[1], w[2]
     ta, tb, tc = corner_uv[face, 0], corner_uv[face, 1], corner_uv[face, 2]
     uv = ta * wa + tb * wb + tc * wc
     material = materials[int(piece[face])]
@@ -161,7 +192,7 @@ def shade_samples(
             normals[corners[0]] * wa + normals[corners[1]] * wb + normals[corners[2]] * wc
         )
         view = wp.normalize(light.camera - point)
-        if area > 0.0:
+        if (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1]) > 0.0:
             normal = -normal  # the inside of cloth or hair
 
         # directions in which u and v grow on the surface, for relief and strands
@@ -187,32 +218,7 @@ def shade_samples(
         outside = point + normal * SHADOW_BIAS_METRES + inside
         key = _key_share(light, shadow, outside, spin)
         open_share = openness[row // samples, column // samples]
-        upward = 0.5 + 0.5 * normal[2]
-        incoming = (light.ground * (1.0 - upward) + light.sky * upward) * open_share
-        highlight = wp.vec3(0.0, 0.0, 0.0)
-        wrap = WRAP_TINT * material.translucency
-        less = wp.vec3(1.0 / (1.0 + wrap[0]), 1.0 / (1.0 + wrap[1]), 1.0 / (1.0 + wrap[2]))
-        for k in range(light.lamps):
-            toward = light.toward[k]
-            seen = open_share
-            if k == 0:
-                seen = key
-            cosine = wp.dot(normal, toward)
-            if material.translucency > 0.0:
-                bent = wp.cw_mul(wp.vec3(cosine, cosine, cosine) + wrap, less)
-                bent = wp.max(bent, wp.vec3(0.0, 0.0, 0.0))
-                incoming += wp.cw_mul(light.colour[k], bent) * seen
-            elif cosine > 0.0:
-                incoming += light.colour[k] * (cosine * seen)
-            if material.gloss > 0.0 and cosine > -0.2:
-                half = wp.normalize(toward + view)
-                shine = wp.max(wp.dot(normal, half), 0.0)
-                if material.sheen_along_v != 0:
-                    across = wp.dot(along_v, half)
-                    shine = wp.sqrt(wp.max(1.0 - across * across, 0.0))
-                strength = material.gloss * seen * wp.clamp(cosine * 3.0 + 0.6, 0.0, 1.0)
-                highlight += light.colour[k] * (strength * wp.pow(shine, material.sharpness))
-        result = wp.cw_mul(albedo, incoming) + highlight
+        result = _lit(albedo, normal, view, along_v, key, open_share, material, light)
     part = share[i]
     value = wp.vec4(result[0] * part, result[1] * part, result[2] * part, part)
     wp.atomic_add(colour, row // samples, column // samples, value)
