@@ -12,6 +12,7 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from motion_transfer.errors import WeightsError
+from motion_transfer.weights import list_misfits
 
 
 class FrozenNetwork(nn.Module):
@@ -50,16 +51,7 @@ def load_weights(
         wanted_name = rename(name)
         if wanted_name is not None:
             state[wanted_name] = tensor
-    wanted = network.state_dict()
-    problems = [f"{name} is missing" for name in wanted if name not in state]
-    problems += [f"{name} is unknown" for name in state if name not in wanted]
-    problems += [
-        f"{name} is {list(state[name].shape)}, not {list(tensor.shape)}"
-        for name, tensor in wanted.items()
-        if name in state and state[name].shape != tensor.shape
-    ]
-    if problems:
-        listed = "; ".join(problems[:3]) + ("; ..." if len(problems) > 3 else "")
+    if listed := list_misfits(network, state):
         raise WeightsError(f"{path} does not hold {what}: {listed}; {remedy}")
     network.load_state_dict(state)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
-from torch import Tensor
+from torch import Tensor, nn
 
 from motion_transfer.errors import WeightsError
 from nhrr_core import ConfigError, ModelConfig, NeuralReRenderer
@@ -71,7 +71,15 @@ def load_checkpoint(path: Path) -> NeuralReRenderer:
     """
     info, state = _read(path, with_tensors=True)
     model = NeuralReRenderer(info.config)
-    wanted = model.state_dict()
+    if listed := list_misfits(model, state):
+        raise WeightsError(f"weights {path} do not fit their own configuration: {listed}")
+    model.load_state_dict(state)
+    return model.eval()
+
+
+def list_misfits(network: nn.Module, state: Mapping[str, Tensor]) -> str:
+    """What keeps tensors from being exactly those of a network, the first three; else empty."""
+    wanted = network.state_dict()
     problems = [f"{name} is missing" for name in wanted if name not in state]
     problems += [f"{name} is unknown" for name in state if name not in wanted]
     problems += [
@@ -79,11 +87,7 @@ def load_checkpoint(path: Path) -> NeuralReRenderer:
         for name, tensor in wanted.items()
         if name in state and state[name].shape != tensor.shape
     ]
-    if problems:
-        listed = "; ".join(problems[:3]) + ("; ..." if len(problems) > 3 else "")
-        raise WeightsError(f"weights {path} do not fit their own configuration: {listed}")
-    model.load_state_dict(state)
-    return model.eval()
+    return "; ".join(problems[:3]) + ("; ..." if len(problems) > 3 else "")
 
 
 def inspect_checkpoint(path: Path) -> CheckpointInfo:
