@@ -121,7 +121,15 @@ def drive(
 )
 @picture_option("--size", default="256x256", metavar="WxH", help="Pixels; default 256x256.")
 @picture_option("--framing", metavar="PART", help="full, three-quarters or upper; default: mixed.")
-@picture_option("--noise", is_flag=True, help="Put DensePose's usual faults into the IUV.")
+@picture_option(
+    "--noise",
+    type=float,
+    is_flag=False,
+    flag_value=1.0,
+    default=0.0,
+    metavar="[SHARE]",
+    help="Put DensePose's usual faults into the IUV of all photos, or of a share of them.",
+)
 @output_option("-o", "--out", type=FILE, required=True, help="A folder; completed if it has some.")
 @output_option("--workers", type=int, metavar="N", help="Processes; default: one for each core.")
 @output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")

@@ -44,7 +44,7 @@ class AlbumOptions:
         count: how many people.
         views: photos of each.
         size: (width, height) in px.
-        noise: put DensePose's faults into the IUV.
+        noise: share of the photos whose IUV gets DensePose's faults, 0 to 1.
         framing: None: mixed.
         workers: processes; None: one for each core. Never changes what is written.
     """
@@ -55,7 +55,7 @@ class AlbumOptions:
     seed: int = 0
     split: Split = "train"
     size: tuple[int, int] = (256, 256)
-    noise: bool = False
+    noise: float = 0.0
     framing: Framing | None = None
     workers: int | None = None
 
@@ -67,6 +67,8 @@ class AlbumOptions:
             raise InputError(f"workers is {self.workers}; it must be at least 1")
         if self.split not in SPLITS:
             raise InputError(f"split {self.split!r}; supported are {', '.join(SPLITS)}")
+        if not 0 <= self.noise <= 1:
+            raise InputError(f"noise is {self.noise}; it is a share of the photos, 0 to 1")
         if self.seed < 0:
             raise InputError(f"seed is {self.seed}; it must be 0 or more")
         if not all(32 <= side <= LONGEST_SIDE for side in self.size):
@@ -89,6 +91,7 @@ class AlbumOptions:
             split=self.split,
             size=self.size,
             noise=IuvNoise.densepose() if self.noise else None,
+            noisy_share=self.noise,
             framing=self.framing,
         )
 

@@ -29,6 +29,7 @@ class PeopleStream:
     Args:
         size: (width, height) of the photos in px.
         noise: faults of DensePose to put into the IUV; None: exact.
+        noisy_share: share of the photos that get them.
         framing: None: mixed.
     """
 
@@ -39,6 +40,7 @@ class PeopleStream:
         split: Split = "train",
         size: tuple[int, int] = (256, 256),
         noise: IuvNoise | None = None,
+        noisy_share: float = 1.0,
         framing: Framing | None = None,
     ) -> None:
         if split not in SPLITS:
@@ -47,7 +49,7 @@ class PeopleStream:
             raise InputError(f"seed is {seed}; it must be 0 or more")
         self.size = size
         self._entropy = (seed, SPLITS.index(split))
-        self._noise = noise
+        self._noise, self._noisy_share = noise, noisy_share
         self._framing: Framing | None = framing
         self._model = load_body_model()
         self._photographer = Photographer(self._model)
@@ -67,8 +69,10 @@ class PeopleStream:
 
     def take(self, dressed: DressedPerson, shot: Shot) -> PersonPhoto:
         """Take a photo."""
+        noisy = np.random.default_rng((shot.seed, 1)).random() < self._noisy_share
         with one_thread():
-            return self._photographer.take(dressed, shot, self.size, self._noise)
+            noise = self._noise if noisy else None
+            return self._photographer.take(dressed, shot, self.size, noise)
 
     def _random(self, number: int, purpose: int) -> np.random.Generator:
         return np.random.default_rng((*self._entropy, number, purpose))

@@ -20,9 +20,15 @@ CHOICES: dict[str, tuple[str, ...]] = {
 }
 
 PEOPLE = "people"
-PEOPLE_RECIPE: dict[str, Any] = {"model.alpha": True, "losses.identity": "none"}
-"""What synthetic people change: they come with alpha, and are trained on without any file.
-Departs from the paper: no face identity loss, as no weights of SphereFace may be shipped."""
+PEOPLE_RECIPE: dict[str, Any] = {
+    "model.alpha": True,
+    "losses.identity": "none",
+    "losses.adversarial_from": 0.85,
+    "optimiser.half_size": 0.7,
+}
+"""What synthetic people change: they come with alpha, and are trained on without any file, on
+whatever machine there is. Departs from the paper: no face identity loss, as no weights of
+SphereFace may be shipped; most steps are made at half size, and the discriminator joins late."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +61,7 @@ class DataSettings:
             within that; a driver's crop holds all of its poses and is larger, too.
         people, views, size_px: how many synthetic people, photos of each, and their side; 0
             people: ever new ones, two photos each, made while training goes on.
+        noise: share of the photos of people whose IUV has the faults of DensePose's.
         people_cache: folder that keeps them; empty: `people` in the run's.
         moments: frames of a clip that are targets, two in a row for each.
         skip_broken: leave pairs with a problem out.
@@ -67,7 +74,7 @@ class DataSettings:
     people: int = 64
     views: int = 4
     size_px: int = 256
-    noise: bool = False
+    noise: float = 0.5
     people_cache: str = ""
     moments: int = 8
     skip_broken: bool = False
@@ -80,7 +87,7 @@ class LossSettings:
     Attributes:
         perceptual, identity: the network, or `none` to leave the loss out.
         vgg19_file: empty: where torchvision keeps it.
-        adversarial_start: step at which the discriminator joins.
+        adversarial_from: share of the steps after which the discriminator joins.
         *_weight: the lambdas. Source: the paper, Sec. 3.5; alpha's is this project's.
     """
 
@@ -89,7 +96,7 @@ class LossSettings:
     identity: Identity = "sphereface"
     sphereface_file: str = ""
     adversarial: bool = True
-    adversarial_start: int = 0
+    adversarial_from: float = 0.0
     discriminator_width: int = 64
     discriminator_scales: int = 3
     perceptual_weight: float = 10.0
@@ -118,7 +125,9 @@ class OptimiserSettings:
         batch_size: pairs at once on each device.
         accumulation: batches whose gradients make one step.
         ema_decay: of the averaged weights, which are what is exported; 0: no average.
-        inpainting_steps: of the first stage of `ip`; 0: half of all steps.
+        half_size: share of the steps, the first ones, at half the sides of textures and images: a
+            quarter of the work.
+        inpainting: share of the steps that are the first stage of `ip`.
     """
 
     learning_rate: float = 2e-4
@@ -127,7 +136,8 @@ class OptimiserSettings:
     batch_size: int = 4
     accumulation: int = 1
     ema_decay: float = 0.999
-    inpainting_steps: int = 0
+    half_size: float = 0.0
+    inpainting: float = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,13 +197,31 @@ class TrainConfig:
                         f"{section.name}.{key.name} is {value!r}; it must be {problem}"
                     )
         parse_colour(self.data.background)
+        if self.optimiser.half_size:
+            for key, multiple in (("image_size", 2**self.model.down_blocks), ("texture_size", 16)):
+                side = getattr(self.model, key)
+                if side % (2 * multiple):
+                    raise InputError(
+                        f"optimiser.half_size is {self.optimiser.half_size}, but half of"
+                        f" model.{key}, {side}, is no multiple of {multiple}; set half_size to 0"
+                    )
+
+    @property
+    def half_size_steps(self) -> int:
+        """Steps at half the sides."""
+        return round(self.run.steps * self.optimiser.half_size)
+
+    @property
+    def adversarial_start(self) -> int:
+        """Steps before the discriminator joins."""
+        return round(self.run.steps * self.losses.adversarial_from)
 
     @property
     def inpainting_steps(self) -> int:
         """Steps of the first stage; 0 for all variants but `ip`."""
         if self.model.variant != "ip":
             return 0
-        return self.optimiser.inpainting_steps or max(1, self.run.steps // 2)
+        return round(self.run.steps * self.optimiser.inpainting)
 
     @property
     def uses_texture_loss(self) -> bool:
@@ -209,6 +237,7 @@ LOWEST = {
     "workers": -1,
 }
 SHARES = ("beta1", "beta2", "ema_decay")
+WHOLE_SHARES = ("noise", "adversarial_from", "half_size", "inpainting")
 
 
 def _find_problem(key: str, value: Any) -> str | None:
@@ -222,4 +251,6 @@ def _find_problem(key: str, value: Any) -> str | None:
         return f"{low} or more"
     if key in SHARES and value >= 1:
         return "below 1"
+    if key in WHOLE_SHARES and value > 1:
+        return "at most 1"
     return None

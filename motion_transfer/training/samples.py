@@ -41,6 +41,7 @@ class SampleSettings:
         alpha: give the target's coverage; a target without one is refused.
         target_texture: unfold the target as well, for the texture loss.
         textures: folder that keeps unfolded textures; None: unfold each time.
+        half_size_samples: how many samples, the first ones, have half of the two sides.
     """
 
     seed: int
@@ -51,6 +52,7 @@ class SampleSettings:
     alpha: bool
     target_texture: bool
     textures: Path | None
+    half_size_samples: int = 0
 
 
 class TrainingSamples(Dataset[dict[str, Tensor]]):
@@ -75,26 +77,33 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         Raises: InputError for a file that broke meanwhile.
         """
         random = np.random.default_rng((self._settings.seed, 1, number))
-        return self.load(self._pairs[self._index(number)], random)
+        shrink = 2 if number < self._settings.half_size_samples else 1
+        return self.load(self._pairs[self._index(number)], random, shrink=shrink)
 
-    def load(self, pair: Pair, random: np.random.Generator | None = None) -> dict[str, Tensor]:
-        """The sample of a pair; without jitter unless there is a random generator."""
+    def load(
+        self, pair: Pair, random: np.random.Generator | None = None, *, shrink: int = 1
+    ) -> dict[str, Tensor]:
+        """The sample of a pair; without jitter unless there is a random generator.
+
+        Args:
+            shrink: divides the sides of textures and images.
+        """
         settings = self._settings
+        size, texture_size = settings.image_size // shrink, settings.texture_size // shrink
         target = pair.target.load()
         window = person_window(target)
         if random is not None:
             window = _jitter(window, settings.jitter, random)
-        size = settings.image_size
         fill = parse_colour(settings.background) or BEYOND_THE_PHOTO
         rgb = cut_picture(window, _lay_over(target, settings.background), size, fill)
         sample = {"target_image": to_tensor(rgb), "target_iuv": _chw(window.cut(target.iuv, size))}
         if settings.alpha:
-            sample["target_alpha"] = to_tensor(self._cut_alpha(window, target))
+            sample["target_alpha"] = to_tensor(self._cut_alpha(window, target, size))
         names = ("source_texture", "source_visibility")
-        sample |= zip(names, self._texture(pair.source), strict=True)
+        sample |= zip(names, self._texture(pair.source, texture_size), strict=True)
         if settings.target_texture:
             names = ("target_texture", "target_visibility")
-            sample |= zip(names, self._texture(pair.target, target), strict=True)
+            sample |= zip(names, self._texture(pair.target, texture_size, target), strict=True)
         return sample
 
     def _index(self, number: int) -> int:
@@ -106,17 +115,19 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             self._order = epoch, random.permutation(len(self._pairs))
         return int(self._order[1][place])
 
-    def _cut_alpha(self, window: Window, target: PersonPicture) -> UInt8[np.ndarray, "S S"]:
+    def _cut_alpha(
+        self, window: Window, target: PersonPicture, size: int
+    ) -> UInt8[np.ndarray, "S S"]:
         if target.alpha is None:
             raise InputError(
                 f"{target.name} has no alpha, which a model with alpha learns from; give it"
                 " STEM_alpha.png, or train without: --set model.alpha=false"
             )
-        return cut_picture(window, target.alpha, self._settings.image_size, 0)
+        return cut_picture(window, target.alpha, size, 0)
 
-    def _texture(self, picture: Picture, loaded: PersonPicture | None = None) -> Texture:
+    def _texture(self, picture: Picture, size: int, loaded: PersonPicture | None = None) -> Texture:
         """Rounded to 8 bits, whether it was kept or not, so that both are the same."""
-        folder, size = self._settings.textures, self._settings.texture_size
+        folder = self._settings.textures
         path = folder and folder / f"{flat_stem(picture.name)}_{size}.png"
         if path and path.exists():
             kept = read_photo(path, "kept texture")

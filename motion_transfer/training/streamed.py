@@ -33,7 +33,7 @@ class StreamedPairs(Sequence[Pair]):
 
     seed: int
     size: tuple[int, int]
-    noise: bool
+    noise: float
     split: Split = "train"
     endless: bool = True
 
@@ -64,7 +64,7 @@ def held_out_pairs(count: int) -> PairList:
     Raises: InputError without the extra.
     """
     people = StreamedPairs(
-        seed=HELD_OUT_SEED, size=HELD_OUT_SIZE, noise=False, split="held-out", endless=False
+        seed=HELD_OUT_SEED, size=HELD_OUT_SIZE, noise=0.0, split="held-out", endless=False
     )
     made_of = [HELD_OUT_SEED, HELD_OUT_SIZE, count, __version__, *map(version, DRAWN_BY)]
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
@@ -94,7 +94,13 @@ class StreamedPhoto:
 def _stream(people: StreamedPairs) -> PeopleStream:
     """Made where it is used: the body model does not travel to other processes."""
     noise = IuvNoise.densepose() if people.noise else None
-    return PeopleStream(seed=people.seed, split=people.split, size=people.size, noise=noise)
+    return PeopleStream(
+        seed=people.seed,
+        split=people.split,
+        size=people.size,
+        noise=noise,
+        noisy_share=people.noise,
+    )
 
 
 @lru_cache(maxsize=8)  # both photos of a pair, in each of several threads

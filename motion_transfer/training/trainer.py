@@ -136,6 +136,7 @@ class Trainer:
                 alpha=config.model.alpha,
                 target_texture=config.uses_texture_loss,
                 textures=textures,
+                half_size_samples=config.half_size_steps * self._samples_a_step,
             ),
         )
 
@@ -214,7 +215,7 @@ class Trainer:
                     self._judges,
                     config.losses.weights,
                     self._arithmetic,
-                    adversarial=self.step >= config.losses.adversarial_start,
+                    adversarial=self.step >= config.adversarial_start,
                     inpainting=inpainting,
                 )
             for name, term in terms.items():

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from motion_transfer.errors import InputError
-from motion_transfer.training.config import PEOPLE_RECIPE, TrainConfig
+from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.config_file import (
     build_config,
     check_value,
@@ -43,7 +43,6 @@ def test_people_come_with_alpha_and_without_a_face_network() -> None:
     assert config.losses.identity == "none"
     chosen = build_config({"losses.identity": "sphereface", "model.alpha": False})
     assert (chosen.losses.identity, chosen.model.alpha) == ("sphereface", False)
-    assert set(PEOPLE_RECIPE) == {"model.alpha", "losses.identity"}
 
 
 def test_written_and_read_it_is_the_same(tmp_path: Path) -> None:
@@ -106,6 +105,7 @@ def test_bad_assignments(text: str) -> None:
         ("run.steps", 0, "it must be 1 or more"),
         ("losses.perceptual", "vgg16", "efficientnet-lite0 or vgg19 or none"),
         ("optimiser.beta1", 1.0, "below 1"),
+        ("data.noise", 1.5, "at most 1"),
         ("losses.texture_weight", float("nan"), "0 or more"),
         ("speed.precision", "fp16", "auto or fp32 or bf16"),
         ("model.image_size", 60, r"\[model\]: image_size is 60"),
@@ -125,8 +125,19 @@ def test_weights_to_start_from_decide_the_shape() -> None:
         build_config({"model.render_width": 16}, model=given)
 
 
+def test_the_stages_of_a_run() -> None:
+    by_the_paper = build_config({"data.source": "pairs.csv", "run.steps": 200})
+    assert (by_the_paper.half_size_steps, by_the_paper.adversarial_start) == (0, 0)
+    on_people = build_config({"run.steps": 200})
+    assert (on_people.half_size_steps, on_people.adversarial_start) == (140, 170)
+    small = {"model.image_size": 24, "model.texture_size": 32}
+    with pytest.raises(InputError, match=r"half of model\.image_size, 24, is no multiple of 8"):
+        build_config(small)
+    assert build_config({**small, "optimiser.half_size": 0}).half_size_steps == 0
+
+
 def test_the_stages_of_ip() -> None:
     assert TrainConfig().inpainting_steps == 0
     assert build_config({"model.variant": "ip", "run.steps": 10}).inpainting_steps == 5
-    chosen = {"model.variant": "ip", "run.steps": 10, "optimiser.inpainting_steps": 3}
+    chosen = {"model.variant": "ip", "run.steps": 10, "optimiser.inpainting": 0.3}
     assert build_config(chosen).inpainting_steps == 3

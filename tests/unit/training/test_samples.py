@@ -76,6 +76,19 @@ def test_a_photo_without_alpha_is_refused_by_a_model_with(paint_pairs) -> None:
     assert "target_alpha" not in plain
 
 
+def test_the_first_samples_have_half_the_sides(paint_pairs, tmp_path) -> None:
+    path = paint_pairs()
+    samples = open_samples(path, half_size_samples=2, textures=tmp_path)
+    sides = [{value.shape[-1] for value in samples[number].values()} for number in range(4)]
+    assert sides == [{32}, {32}, {64}, {64}]
+    assert same(samples[2], open_samples(path)[2])
+    whole, half = open_samples(path, jitter=0)[0], samples.load(open_pairs(path)[0], shrink=2)
+    assert same(half, samples.load(open_pairs(path)[0], shrink=2)), "kept textures are the same"
+    shrunk = torch.nn.functional.avg_pool2d(whole["target_image"], 2)
+    found = open_samples(path, jitter=0, half_size_samples=1)[0]["target_image"]
+    assert (found - shrunk).abs().mean() < 0.02, "the same crop"
+
+
 def test_the_number_decides(paint_pairs) -> None:
     path = paint_pairs(3)
     first, again = open_samples(path), open_samples(path)

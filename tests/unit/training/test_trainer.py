@@ -227,7 +227,7 @@ def test_a_file_that_breaks_meanwhile_is_named(run: Run, paint_pairs) -> None:
 
 
 def test_bf16_trains(run: Run) -> None:
-    run.train(**{"speed.precision": "bf16", "run.steps": 2, "losses.adversarial_start": 1})
+    run.train(**{"speed.precision": "bf16", "run.steps": 2, "losses.adversarial_from": 0.5})
     assert "adversarial" not in run.logged[0].terms
     assert "adversarial" in run.logged[1].terms
     state = run.checkpoint(2)
