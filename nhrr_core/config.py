@@ -22,6 +22,11 @@ class ModelConfig:
     Source: the paper, Sec. 3; widths from Pix2PixHD's global generator (RenderNet) and U-Net
     (FeatureNet). Departs from it: `visibility_input` (on) gives FeatureNet the visibility as a
     fourth channel, because an unseen texel and a mid-grey one are otherwise the same input.
+    `colour_shortcut` (off; on in `lite`) carries colours past both networks, so that they learn in
+    hours what to change instead of learning in days to copy: FeatureNet's first three channels are
+    added to the partial texture, and RenderNet writes one more channel, the share with which the
+    feature image's first three show through its drawing, as Vid2Vid blends (Wang et al., NeurIPS
+    2018, Sec. 3.2).
 
     Attributes:
         variant: `full`; `no-int` (same networks, trained without the texture loss); `ip` (the map
@@ -34,7 +39,7 @@ class ModelConfig:
         texture_size: side of the UV texture in texels, a multiple of 16.
         image_size: side of the image RenderNet works on in pixels, a multiple of 2**down_blocks.
         alpha: RenderNet has a fourth output, the person's coverage.
-        visibility_input: see above.
+        visibility_input, colour_shortcut: see above.
     """
 
     variant: Variant = "full"
@@ -47,11 +52,12 @@ class ModelConfig:
     image_size: int = 256
     alpha: bool = False
     visibility_input: bool = True
+    colour_shortcut: bool = False
 
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
             raise ConfigError(f"variant is {self.variant!r}; supported are {', '.join(VARIANTS)}")
-        for name in ("alpha", "visibility_input"):
+        for name in ("alpha", "visibility_input", "colour_shortcut"):
             if not isinstance(getattr(self, name), bool):
                 raise ConfigError(f"{name} is {getattr(self, name)!r}; it must be true or false")
         for name, low, high, multiple in (
@@ -108,11 +114,16 @@ class ModelConfig:
 
     @property
     def render_outputs(self) -> int:
-        """Channels that RenderNet writes: RGB, and alpha where the configuration has it."""
+        """Channels of a frame: RGB, and alpha where the configuration has it."""
         return COLOUR_CHANNELS + int(self.alpha)
+
+    @property
+    def drawn_channels(self) -> int:
+        """Channels that RenderNet writes: a frame's, and the share that the colours show with."""
+        return self.render_outputs + int(self.colour_shortcut)
 
 
 PRESETS = {
     "paper": ModelConfig(),
-    "lite": ModelConfig(feature_width=32, render_width=32),
+    "lite": ModelConfig(feature_width=32, render_width=32, colour_shortcut=True),
 }

@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
-from nhrr_core.config import ModelConfig
+from nhrr_core.config import COLOUR_CHANNELS, ModelConfig
 from nhrr_core.errors import ShapeError
 from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import normalise_iuv
@@ -45,7 +45,7 @@ class NeuralReRenderer(nn.Module):
         )
         self.render_net = RenderNet(
             inputs=config.render_inputs,
-            outputs=config.render_outputs,
+            outputs=config.drawn_channels,
             width=config.render_width,
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
@@ -71,9 +71,12 @@ class NeuralReRenderer(nn.Module):
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
             raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
-        if self.config.visibility_input:
-            texture = torch.cat([texture, visibility], dim=1)
-        return self.feature_net(texture)
+        inputs = [texture, visibility] if self.config.visibility_input else [texture]
+        feature_map = self.feature_net(torch.cat(inputs, dim=1))
+        if not self.config.colour_shortcut:
+            return feature_map
+        colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
+        return torch.cat([colours + texture, others], dim=1)
 
     def feature_image(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
@@ -96,7 +99,21 @@ class NeuralReRenderer(nn.Module):
             raise ShapeError(
                 f"target IUV {list(target_iuv.shape)}: its sides must be multiples of {multiple}"
             )
-        return self.render_net(self.feature_image(feature_map, target_iuv))
+        feature_image = self.feature_image(feature_map, target_iuv)
+        return self.blend(self.render_net(feature_image), feature_image)
+
+    def blend(
+        self, drawn: Float[Tensor, "B D H W"], feature_image: Float[Tensor, "B C H W"]
+    ) -> Float[Tensor, "B K H W"]:
+        """The frame, from what RenderNet drew of a feature image.
+
+        With `config.colour_shortcut` the image's colours show through; otherwise it is the drawing.
+        """
+        if not self.config.colour_shortcut:
+            return drawn
+        painted, alpha, share = drawn.tensor_split([COLOUR_CHANNELS, -1], dim=1)
+        colours = feature_image[:, :COLOUR_CHANNELS].clamp(-1, 1)
+        return torch.cat([torch.lerp(painted, colours, (share + 1) / 2), alpha], dim=1)
 
     def forward(
         self,

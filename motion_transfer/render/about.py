@@ -72,7 +72,7 @@ def describe_preset(config: ModelConfig) -> Facts:
         feature_net = FeatureNet(inputs=4, outputs=config.map_channels, width=config.feature_width)
         render_net = RenderNet(
             inputs=config.render_inputs,
-            outputs=config.render_outputs,
+            outputs=config.drawn_channels,
             width=config.render_width,
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,

@@ -63,7 +63,8 @@ class NeuralRenderer:
         with torch.inference_mode():
             target = torch.from_numpy(iuv).to(self.device).permute(0, 3, 1, 2)
             features = self._model.feature_image(self._feature_map, target)
-            pixels = ((self._draw(features) + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
+            frame = self._model.blend(self._draw(features), features)
+            pixels = ((frame + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
             images = pixels.permute(0, 2, 3, 1).cpu().numpy()
         if images.shape[-1] == 4:
             return images

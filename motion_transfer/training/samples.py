@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.utils.data import Dataset, Sampler
@@ -89,7 +90,7 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             shrink: divides the sides of textures and images.
         """
         settings = self._settings
-        size, texture_size = settings.image_size // shrink, settings.texture_size // shrink
+        size = settings.image_size // shrink
         target = pair.target.load()
         window = person_window(target)
         if random is not None:
@@ -100,10 +101,10 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         if settings.alpha:
             sample["target_alpha"] = to_tensor(self._cut_alpha(window, target, size))
         names = ("source_texture", "source_visibility")
-        sample |= zip(names, self._texture(pair.source, texture_size), strict=True)
+        sample |= zip(names, self._texture(pair.source, shrink), strict=True)
         if settings.target_texture:
             names = ("target_texture", "target_visibility")
-            sample |= zip(names, self._texture(pair.target, texture_size, target), strict=True)
+            sample |= zip(names, self._texture(pair.target, shrink, target), strict=True)
         return sample
 
     def _index(self, number: int) -> int:
@@ -125,18 +126,25 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             )
         return cut_picture(window, target.alpha, size, 0)
 
-    def _texture(self, picture: Picture, size: int, loaded: PersonPicture | None = None) -> Texture:
+    def _texture(
+        self, picture: Picture, shrink: int, loaded: PersonPicture | None = None
+    ) -> Texture:
         """Rounded to 8 bits, whether it was kept or not, so that both are the same."""
-        folder = self._settings.textures
+        return _shrink(_as_texture(*self._unfolded(picture, loaded)), shrink)
+
+    def _unfolded(
+        self, picture: Picture, loaded: PersonPicture | None
+    ) -> tuple[Image, UInt8[np.ndarray, "T T"]]:
+        folder, size = self._settings.textures, self._settings.texture_size
         path = folder and folder / f"{flat_stem(picture.name)}_{size}.png"
         if path and path.exists():
             kept = read_photo(path, "kept texture")
             assert kept.alpha is not None
-            return _as_texture(kept.rgb, kept.alpha)
+            return kept.rgb, kept.alpha
         rgb, seen = _unfold(loaded or picture.load(), size)
         if path:
             _keep(path, rgb, seen)
-        return _as_texture(rgb, seen)
+        return rgb, seen
 
 
 class RunSampler(Sampler[list[int]]):
@@ -219,6 +227,16 @@ def _unfold(picture: PersonPicture, size: int) -> tuple[Image, UInt8[np.ndarray,
 def _as_texture(rgb: Image, seen: UInt8[np.ndarray, "T T"]) -> Texture:
     visibility = (_chw(seen[..., None]) > 0).float()
     return to_tensor(rgb) * visibility, visibility
+
+
+def _shrink(texture: Texture, shrink: int) -> Texture:
+    """Each texel the mean of those seen in its place, seen where any of them is."""
+    colours, visibility = texture
+    if shrink == 1:
+        return texture
+    share = F.avg_pool2d(visibility, shrink)
+    mean = F.avg_pool2d(colours, shrink) / share.clamp_min(1 / shrink**2)
+    return mean, (share > 0).float()
 
 
 def _keep(path: Path, rgb: Image, seen: UInt8[np.ndarray, "T T"]) -> None:

@@ -67,7 +67,8 @@ class Generator(nn.Module):
         if target_iuv is None:
             return feature_map, None, None
         feature_image = self.model.feature_image(feature_map, target_iuv)
-        return feature_map, feature_image, self.model.render_net(feature_image).float()
+        drawn = self.model.render_net(feature_image).float()
+        return feature_map, feature_image, self.model.blend(drawn, feature_image)
 
 
 @dataclass(frozen=True)

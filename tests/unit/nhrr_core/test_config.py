@@ -23,13 +23,16 @@ def test_defaults_are_the_papers() -> None:
         "image_size": 256,
         "alpha": False,
         "visibility_input": True,
+        "colour_shortcut": False,
     }
 
 
 def test_presets() -> None:
     assert set(PRESETS) == {"paper", "lite"}
     assert ModelConfig.preset("paper") == ModelConfig()
-    assert ModelConfig.preset("lite") == ModelConfig(feature_width=32, render_width=32)
+    assert ModelConfig.preset("lite") == ModelConfig(
+        feature_width=32, render_width=32, colour_shortcut=True
+    )
 
 
 def test_preset_takes_changes() -> None:
@@ -154,6 +157,9 @@ def test_channels_of_a_variant(
     assert config.render_inputs == render_inputs
     assert config.render_outputs == 3
     assert ModelConfig(variant=variant, alpha=True).render_outputs == 4
+    for alpha in (False, True):
+        config = ModelConfig(variant=variant, alpha=alpha, colour_shortcut=True)
+        assert config.drawn_channels == config.render_outputs + 1
 
 
 def test_feature_channels_reach_the_map_of_full_only() -> None:

@@ -124,6 +124,49 @@ def test_visibility_matters_where_it_is_an_input(photo: Tensor, iuv: Tensor) -> 
     assert not torch.allclose(seen, unseen)
 
 
+@pytest.mark.parametrize("variant", ["full", "no-int", "ip"])
+def test_the_shortcut_adds_the_texture(photo: Tensor, iuv: Tensor, variant: str) -> None:
+    torch.manual_seed(0)
+    model = small(variant=variant, colour_shortcut=True)
+    assert model.feature_net is not None
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    inputs = torch.cat([texture, visibility], dim=1)
+    change = model.encode_texture(texture, visibility) - model.feature_net(inputs)
+    assert torch.allclose(change[:, :3], texture, atol=1e-6)
+    assert not change[:, 3:].any()
+    torch.nn.init.zeros_(model.feature_net.exit.weight)
+    torch.nn.init.zeros_(model.feature_net.exit.bias)
+    assert torch.equal(model.encode(photo, iuv)[:, :3], texture)
+
+
+@pytest.mark.parametrize("alpha", [False, True])
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_share_of_the_shortcut(targets: Tensor, variant: str, alpha: bool) -> None:
+    model = small(variant=variant, alpha=alpha, colour_shortcut=True)
+    feature_image = torch.rand(3, model.config.render_inputs, 32, 32) * 4 - 2
+    channels = model.config.drawn_channels
+    drawn = torch.rand(3, channels, 32, 32) * 2 - 1
+    drawn[0, -1], drawn[1, -1], drawn[2, -1] = 1, -1, 0
+    frame = model.blend(drawn, feature_image)
+    colours = feature_image[:, :3].clamp(-1, 1)
+    assert frame.shape == (3, 4 if alpha else 3, 32, 32)
+    assert torch.allclose(frame[0, :3], colours[0])
+    assert torch.allclose(frame[1, :3], drawn[1, :3])
+    assert torch.allclose(frame[2, :3], (drawn[2, :3] + colours[2]) / 2)
+    if alpha:
+        assert torch.equal(frame[:, 3], drawn[:, 3])
+
+
+def test_rendering_blends(targets: Tensor) -> None:
+    model = small(colour_shortcut=True, alpha=True)
+    feature_map = torch.rand(1, 16, 64, 64)
+    image = model.feature_image(feature_map, targets)
+    expected = model.blend(model.render_net(image), image)
+    assert torch.equal(model.render(feature_map, targets), expected)
+    plain = small()
+    assert plain.blend(image, image) is image
+
+
 def test_render_net_sees_the_sampled_map(targets: Tensor) -> None:
     model = small()
     feature_map = torch.rand(1, 16, 64, 64)

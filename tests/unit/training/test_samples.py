@@ -82,11 +82,24 @@ def test_the_first_samples_have_half_the_sides(paint_pairs, tmp_path) -> None:
     sides = [{value.shape[-1] for value in samples[number].values()} for number in range(4)]
     assert sides == [{32}, {32}, {64}, {64}]
     assert same(samples[2], open_samples(path)[2])
-    whole, half = open_samples(path, jitter=0)[0], samples.load(open_pairs(path)[0], shrink=2)
-    assert same(half, samples.load(open_pairs(path)[0], shrink=2)), "kept textures are the same"
+    assert same(samples[0], open_samples(path, half_size_samples=2)[0]), "kept or not"
+    whole, half = (open_samples(path, jitter=0, half_size_samples=count)[0] for count in (0, 1))
     shrunk = torch.nn.functional.avg_pool2d(whole["target_image"], 2)
-    found = open_samples(path, jitter=0, half_size_samples=1)[0]["target_image"]
-    assert (found - shrunk).abs().mean() < 0.02, "the same crop"
+    assert (half["target_image"] - shrunk).abs().mean() < 0.02, "the same crop"
+
+
+def test_a_texture_is_halved_over_the_texels_seen(paint_pairs) -> None:
+    path = paint_pairs(1)
+    whole, half = (open_samples(path, half_size_samples=count)[0] for count in (0, 1))
+    colours, seen = whole["source_texture"], whole["source_visibility"][0] > 0
+    assert 0 < seen.float().mean() < 1
+    for row, column in torch.cartesian_prod(torch.arange(32), torch.arange(32)).tolist():
+        place = (slice(2 * row, 2 * row + 2), slice(2 * column, 2 * column + 2))
+        found = half["source_texture"][:, row, column]
+        assert half["source_visibility"][0, row, column] == seen[place].any()
+        texels = colours[:, *place][:, seen[place]]
+        expected = texels.mean(1) if texels.numel() else torch.zeros(3)
+        assert torch.allclose(found, expected, atol=1e-6)
 
 
 def test_the_number_decides(paint_pairs) -> None:
