@@ -29,7 +29,7 @@ from nhrr_core.losses import (
 from nhrr_core.model import NeuralReRenderer
 from nhrr_core.render_net import RenderNet
 from nhrr_core.sampling import sample_features
-from nhrr_core.texture import extract_texture, merge_textures
+from nhrr_core.texture import extract_texture, merge_textures, mirror_texture
 from nhrr_core.uv_layout import UVLayout, load_uv_layout, texture_coordinates
 
 __all__ = [
@@ -60,6 +60,7 @@ __all__ = [
     "keep_parts",
     "load_uv_layout",
     "merge_textures",
+    "mirror_texture",
     "normalise_iuv",
     "perceptual_loss",
     "sample_features",

@@ -12,7 +12,7 @@ from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import normalise_iuv
 from nhrr_core.render_net import RenderNet
 from nhrr_core.sampling import sample_features
-from nhrr_core.texture import extract_texture
+from nhrr_core.texture import extract_texture, mirror_texture
 from nhrr_core.uv_layout import load_uv_layout
 
 
@@ -30,13 +30,15 @@ class NeuralReRenderer(nn.Module):
     """
 
     charts: Tensor
+    side_twin: Tensor
+    depth_twin: Tensor
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
         self.feature_net = (
             FeatureNet(
-                inputs=3 + int(config.visibility_input),
+                inputs=config.feature_inputs,
                 outputs=config.map_channels,
                 width=config.feature_width,
             )
@@ -50,7 +52,9 @@ class NeuralReRenderer(nn.Module):
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
         )
-        self.register_buffer("charts", load_uv_layout().charts.clone(), persistent=False)
+        layout = load_uv_layout()
+        for name in ("charts", "side_twin", "depth_twin"):
+            self.register_buffer(name, getattr(layout, name).clone(), persistent=False)
 
     def encode(
         self, photo: Float[Tensor, "B 3 H W"], iuv: UInt8[Tensor, "B 3 H W"]
@@ -71,8 +75,12 @@ class NeuralReRenderer(nn.Module):
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
             raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
-        inputs = [texture, visibility] if self.config.visibility_input else [texture]
-        feature_map = self.feature_net(torch.cat(inputs, dim=1))
+        known = [visibility] if self.config.visibility_input else []
+        if self.config.mirrored:
+            twins = self.side_twin, self.depth_twin
+            texture, shown = mirror_texture(texture, visibility, *twins)
+            known.append(shown)
+        feature_map = self.feature_net(torch.cat([texture, *known], dim=1))
         if not self.config.colour_shortcut:
             return feature_map
         colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)

@@ -91,6 +91,44 @@ def _texel(place: Float[Tensor, "*shape 2"], batch: Tensor, size: int) -> Int64[
     return (batch * size + row) * size + column
 
 
+def mirror_texture(
+    texture: Float[Tensor, "B C T T"],
+    visibility: Float[Tensor, "B 1 T T"],
+    side_twin: Int64[Tensor, "256 256"],
+    depth_twin: Int64[Tensor, "256 256"],
+) -> tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]:
+    """Give hidden texels the colours of their mirror image on the body.
+
+    First those of the other side, then those of the other face of the same limb, then those of the
+    other side's other face.
+
+    Args:
+        side_twin, depth_twin: of `UVLayout`.
+    Returns: the texture, 0 where neither a texel nor a mirror image of it is visible; and 1 where
+        one of them is.
+    Source: this project's.
+    """
+    size = texture.shape[-1]
+    side, depth = (_resize_twins(twin, size) for twin in (side_twin, depth_twin))
+    colours, shown = texture.flatten(2), visibility.flatten(2) > 0
+    for twin in (side, depth, side):
+        gain = ~shown & shown[..., twin]
+        colours = torch.where(gain, colours[..., twin], colours)
+        shown = shown | gain
+    return colours.view_as(texture), shown.to(visibility.dtype).view_as(visibility)
+
+
+def _resize_twins(twin: Int64[Tensor, "S S"], size: int) -> Int64[Tensor, " L"]:
+    """A table of twins for a texture of another size, flat; the nearest texels'."""
+    own = twin.shape[-1]
+    if size == own:
+        return twin.flatten()
+    centres = ((torch.arange(size, device=twin.device) + 0.5) * own / size).long()
+    chosen = twin[centres][:, centres]
+    rows, columns = chosen // own, chosen % own
+    return (rows * size // own * size + columns * size // own).flatten()
+
+
 def _scatter(
     values: Float[Tensor, "N C"], index: Int64[Tensor, " N"], length: int
 ) -> tuple[Float[Tensor, "L C"], Float[Tensor, " L"]]:

@@ -69,7 +69,11 @@ def describe_setup() -> Facts:
 def describe_preset(config: ModelConfig) -> Facts:
     """Parameters, file size and arithmetic of one configuration."""
     with torch.device("meta"):
-        feature_net = FeatureNet(inputs=4, outputs=config.map_channels, width=config.feature_width)
+        feature_net = FeatureNet(
+            inputs=config.feature_inputs,
+            outputs=config.map_channels,
+            width=config.feature_width,
+        )
         render_net = RenderNet(
             inputs=config.render_inputs,
             outputs=config.drawn_channels,

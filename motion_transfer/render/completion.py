@@ -13,7 +13,7 @@ from jaxtyping import Float
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from nhrr_core import PART_GROUPS, UVLayout
+from nhrr_core import PART_GROUPS, UVLayout, mirror_texture
 from nhrr_core.uv_layout import TWIN_SIZE
 
 NEIGHBOURS = 12
@@ -29,13 +29,9 @@ def complete_texture(
     if texture.shape[-1] != TWIN_SIZE:
         texture = F.interpolate(texture, (TWIN_SIZE, TWIN_SIZE), mode="area")
         visibility = (F.interpolate(visibility, (TWIN_SIZE, TWIN_SIZE), mode="area") == 1).float()
+    texture, shown = mirror_texture(texture, visibility, layout.side_twin, layout.depth_twin)
     colours = texture[0].permute(1, 2, 0).reshape(-1, 3).clone()
-    known = visibility[0, 0].reshape(-1) > 0
-    side, depth = layout.side_twin.reshape(-1), layout.depth_twin.reshape(-1)
-    for twin in (side, depth, side):
-        gain = ~known & known[twin]
-        colours[gain] = colours[twin[gain]]
-        known = known | gain
+    known = shown[0, 0].reshape(-1) > 0
     if known.all() or not known.any():
         return colours.view(1, TWIN_SIZE, TWIN_SIZE, 3).permute(0, 3, 1, 2)
 

@@ -115,6 +115,12 @@ def _open_people(
     )
     write_album(options, lambda count: photographed(count, settings.people))
     pairs = open_pairs(folder / "pairs.csv", thorough=False, done=looked)
+    found = len({Path(pair.source.name).parent for pair in pairs})
+    if found != settings.people:  # an album is only ever added to
+        raise InputError(
+            f"{folder} holds {found} people, but {settings.people} are asked for; train on all of"
+            f" them with --people {found}, or name another --people-cache"
+        )
     return _describe(pairs, f"{settings.people} synthetic people, {settings.views} photos each")
 
 
