@@ -25,9 +25,9 @@ class ModelConfig:
     Two more are off, and on in `lite`, so that networks learn in hours what to change instead of
     learning in days to copy. `mirrored` gives FeatureNet a texture whose hidden texels show their
     mirror image on the body (`mirror_texture`), and as one more channel which still show nothing.
-    `colour_shortcut` carries colours past both networks: FeatureNet's first three channels are added
-    to its input's, and RenderNet writes one more channel, the share with which the feature image's
-    first three show through its drawing, as in Vid2Vid (Wang et al., NeurIPS 2018, Sec. 3.2).
+    `colour_shortcut` carries colours past both networks: FeatureNet's first three channels are
+    added to its input's, and RenderNet writes one more channel, the share with which the feature
+    image's first three show through its drawing, as in Vid2Vid (Wang et al., NeurIPS 2018, Sec. 3).
 
     Attributes:
         variant: `full`; `no-int` (same networks, trained without the texture loss); `ip` (the map

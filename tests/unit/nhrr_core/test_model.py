@@ -14,6 +14,8 @@ from nhrr_core import (
     NeuralReRenderer,
     ShapeError,
     extract_texture,
+    load_uv_layout,
+    mirror_texture,
     normalise_iuv,
     sample_features,
 )
@@ -137,6 +139,20 @@ def test_the_shortcut_adds_the_texture(photo: Tensor, iuv: Tensor, variant: str)
     torch.nn.init.zeros_(model.feature_net.exit.weight)
     torch.nn.init.zeros_(model.feature_net.exit.bias)
     assert torch.equal(model.encode(photo, iuv)[:, :3], texture)
+
+
+def test_a_mirrored_texture_is_what_feature_net_starts_from(photo: Tensor, iuv: Tensor) -> None:
+    torch.manual_seed(0)
+    model = small(mirrored=True, colour_shortcut=True)
+    assert model.feature_net is not None
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    layout = load_uv_layout()
+    mirrored, shown = mirror_texture(texture, visibility, layout.side_twin, layout.depth_twin)
+    assert shown.sum() > visibility.sum()
+    inputs = torch.cat([mirrored, visibility, shown], dim=1)
+    expected = model.feature_net(inputs)
+    expected[:, :3] += mirrored
+    assert torch.allclose(model.encode_texture(texture, visibility), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("alpha", [False, True])

@@ -11,7 +11,9 @@ from nhrr_core import (
     ShapeError,
     extract_texture,
     keep_parts,
+    load_uv_layout,
     merge_textures,
+    mirror_texture,
     sample_features,
 )
 
@@ -432,3 +434,63 @@ def test_nothing_is_filled_across_a_texture_seam(
     left, right = int(charts[0, 91, 99, 0] * 256), int(charts[0, 91, 100, 0] * 256)
     assert right - left > 3
     assert bool((visibility[91, left + 1 : right] > 0).all()) is filled
+
+
+# Mirroring
+
+
+def mirrored_by_loops(colours: list, shown: list[bool], *tables: list[int]) -> tuple[list, list]:
+    """Texel by texel: whoever shows nothing asks its twin, one table after the other."""
+    for table in tables:
+        before = list(colours), list(shown)
+        for texel, twin in enumerate(table):
+            if not before[1][texel] and before[1][twin]:
+                colours[texel], shown[texel] = before[0][twin], True
+    return colours, shown
+
+
+def mirror(texture: Tensor, visibility: Tensor) -> tuple[Tensor, Tensor]:
+    layout = load_uv_layout()
+    return mirror_texture(texture, visibility, layout.side_twin, layout.depth_twin)
+
+
+def test_mirroring_equals_loops() -> None:
+    generator = torch.Generator().manual_seed(0)
+    visibility = (torch.rand(1, 1, 256, 256, generator=generator) > 0.9).float()
+    texture = torch.rand(1, 1, 256, 256, generator=generator) * visibility
+    layout = load_uv_layout()
+    side, depth = (twin.flatten().tolist() for twin in (layout.side_twin, layout.depth_twin))
+    colours, shown = mirrored_by_loops(
+        texture.flatten().tolist(), (visibility > 0).flatten().tolist(), side, depth, side
+    )
+    found, known = mirror(texture, visibility)
+    assert torch.equal(found.flatten(), torch.tensor(colours))
+    assert torch.equal(known.flatten() > 0, torch.tensor(shown))
+    assert 0.25 < known.mean() < 0.5
+
+
+@pytest.mark.parametrize("size", [128, 256, 512])
+def test_one_side_shows_the_other(size: int) -> None:
+    """A texture of places on the body, of which only the person's left is seen."""
+    layout = load_uv_layout()
+    place = F.interpolate(layout.position.permute(2, 0, 1)[None], (size, size), mode="nearest")
+    left = (place[:, :1] > 0).float()
+    found, known = mirror(place * left, left)
+    hidden = (left == 0)[0, 0]
+    assert known[0, 0][hidden].mean() > 0.95
+    mirrored = place * torch.tensor([-1.0, 1.0, 1.0]).view(3, 1, 1)
+    distance = (found - mirrored)[0, :, hidden].norm(dim=0)
+    assert distance.median() < 0.02, "metres"
+
+
+def test_what_is_seen_stays_and_images_do_not_mix() -> None:
+    visibility = (torch.rand(2, 1, 64, 64) > 0.5).float()
+    texture = torch.rand(2, 3, 64, 64) * visibility
+    found, known = mirror(texture, visibility)
+    assert torch.equal(found * visibility, texture)
+    assert torch.equal(known * visibility, visibility)
+    for image in (0, 1):
+        alone = mirror(texture[image : image + 1], visibility[image : image + 1])
+        assert torch.equal(found[image : image + 1], alone[0])
+    nothing = torch.zeros_like(visibility)
+    assert not mirror(torch.zeros_like(texture), nothing)[1].any()
