@@ -29,7 +29,13 @@ from nhrr_core.losses import (
 from nhrr_core.model import NeuralReRenderer
 from nhrr_core.render_net import RenderNet
 from nhrr_core.sampling import sample_features
-from nhrr_core.texture import extract_texture, merge_textures, mirror_texture
+from nhrr_core.texture import (
+    extract_texture,
+    fill_texture,
+    measure_surroundings,
+    merge_textures,
+    mirror_texture,
+)
 from nhrr_core.uv_layout import UVLayout, load_uv_layout, texture_coordinates
 
 __all__ = [
@@ -56,9 +62,11 @@ __all__ = [
     "discriminator_loss",
     "extract_texture",
     "face_identity_loss",
+    "fill_texture",
     "generator_loss",
     "keep_parts",
     "load_uv_layout",
+    "measure_surroundings",
     "merge_textures",
     "mirror_texture",
     "normalise_iuv",

@@ -23,8 +23,9 @@ class ModelConfig:
     (FeatureNet). Departs from it: `visibility_input` (on) gives FeatureNet the visibility as a
     fourth channel, because an unseen texel and a mid-grey one are otherwise the same input.
     Two more are off, and on in `lite`, so that networks learn in hours what to change instead of
-    learning in days to copy. `mirrored` gives FeatureNet a texture whose hidden texels show their
-    mirror image on the body (`mirror_texture`), and as one more channel which still show nothing.
+    learning in days to copy. `prefilled` gives FeatureNet a texture whose hidden texels show their
+    mirror image on the body (`mirror_texture`) or else the colours around them (`fill_texture`),
+    and as one more channel which of the two.
     `colour_shortcut` carries colours past both networks: FeatureNet's first three channels are
     added to its input's, and RenderNet writes one more channel, the share with which the feature
     image's first three show through its drawing, as in Vid2Vid (Wang et al., NeurIPS 2018, Sec. 3).
@@ -40,7 +41,7 @@ class ModelConfig:
         texture_size: side of the UV texture in texels, a multiple of 16.
         image_size: side of the image RenderNet works on in pixels, a multiple of 2**down_blocks.
         alpha: RenderNet has a fourth output, the person's coverage.
-        visibility_input, mirrored, colour_shortcut: see above.
+        visibility_input, prefilled, colour_shortcut: see above.
     """
 
     variant: Variant = "full"
@@ -53,13 +54,13 @@ class ModelConfig:
     image_size: int = 256
     alpha: bool = False
     visibility_input: bool = True
-    mirrored: bool = False
+    prefilled: bool = False
     colour_shortcut: bool = False
 
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
             raise ConfigError(f"variant is {self.variant!r}; supported are {', '.join(VARIANTS)}")
-        for name in ("alpha", "visibility_input", "mirrored", "colour_shortcut"):
+        for name in ("alpha", "visibility_input", "prefilled", "colour_shortcut"):
             if not isinstance(getattr(self, name), bool):
                 raise ConfigError(f"{name} is {getattr(self, name)!r}; it must be true or false")
         for name, low, high, multiple in (
@@ -107,7 +108,7 @@ class ModelConfig:
     @property
     def feature_inputs(self) -> int:
         """Channels that FeatureNet reads: RGB, and what is known of each texel."""
-        return COLOUR_CHANNELS + int(self.visibility_input) + int(self.mirrored)
+        return COLOUR_CHANNELS + int(self.visibility_input) + int(self.prefilled)
 
     @property
     def map_channels(self) -> int:
@@ -132,5 +133,5 @@ class ModelConfig:
 
 PRESETS = {
     "paper": ModelConfig(),
-    "lite": ModelConfig(feature_width=32, render_width=32, mirrored=True, colour_shortcut=True),
+    "lite": ModelConfig(feature_width=32, render_width=32, prefilled=True, colour_shortcut=True),
 }

@@ -12,7 +12,12 @@ from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import normalise_iuv
 from nhrr_core.render_net import RenderNet
 from nhrr_core.sampling import sample_features
-from nhrr_core.texture import extract_texture, mirror_texture
+from nhrr_core.texture import (
+    extract_texture,
+    fill_texture,
+    measure_surroundings,
+    mirror_texture,
+)
 from nhrr_core.uv_layout import load_uv_layout
 
 
@@ -32,6 +37,8 @@ class NeuralReRenderer(nn.Module):
     charts: Tensor
     side_twin: Tensor
     depth_twin: Tensor
+    position: Tensor
+    surroundings: Tensor
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
@@ -53,8 +60,10 @@ class NeuralReRenderer(nn.Module):
             residual_blocks=config.residual_blocks,
         )
         layout = load_uv_layout()
-        for name in ("charts", "side_twin", "depth_twin"):
+        for name in ("charts", "side_twin", "depth_twin", "position"):
             self.register_buffer(name, getattr(layout, name).clone(), persistent=False)
+        surroundings = measure_surroundings(layout.position)
+        self.register_buffer("surroundings", surroundings, persistent=False)
 
     def encode(
         self, photo: Float[Tensor, "B 3 H W"], iuv: UInt8[Tensor, "B 3 H W"]
@@ -76,9 +85,10 @@ class NeuralReRenderer(nn.Module):
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
             raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
         known = [visibility] if self.config.visibility_input else []
-        if self.config.mirrored:
+        if self.config.prefilled:
             twins = self.side_twin, self.depth_twin
             texture, shown = mirror_texture(texture, visibility, *twins)
+            texture = fill_texture(texture, shown, self.position, self.surroundings)
             known.append(shown)
         feature_map = self.feature_net(torch.cat([texture, *known], dim=1))
         if not self.config.colour_shortcut:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import torch
-from jaxtyping import Float, Int64, UInt8
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 
 from nhrr_core.errors import ShapeError
@@ -18,6 +19,15 @@ MAX_STRETCH = 1 / 16
 
 SAMPLES_PER_TEXEL = 3.0
 """Density of the points that fill between pixels, so that none is missed where charts bend."""
+
+FILL_FROM, FILL_TO = 32, 64
+"""Places along a side of the texture whose colours are spread, and to which."""
+
+FILL_METRES = 0.02
+"""Distances on the body below this count about alike."""
+
+PLACE_METRES = 0.12
+"""Texels of a place lie within that of its middle on the body, unless they are of another part."""
 
 MAX_ENTRY_STEP = 0.03
 """Neighbouring entries of the lookup table further apart lie on two sides of a texture seam."""
@@ -116,6 +126,62 @@ def mirror_texture(
         colours = torch.where(gain, colours[..., twin], colours)
         shown = shown | gain
     return colours.view_as(texture), shown.to(visibility.dtype).view_as(visibility)
+
+
+def fill_texture(
+    texture: Float[Tensor, "B C T T"],
+    shown: Float[Tensor, "B 1 T T"],
+    position: Float[Tensor, "256 256 3"],
+    surroundings: Float[Tensor, "N M"],
+) -> Float[Tensor, "B C T T"]:
+    """Give texels that show nothing a mean of the colours around them on the body.
+
+    It is one for each FILL_TO x FILL_TO-th of the texture, from FILL_FROM x FILL_FROM means of what
+    is shown: it tells colours, not patterns.
+
+    Args:
+        shown: 1 where the texture shows something; such texels stay as they are.
+        position: of `UVLayout`.
+        surroundings: `measure_surroundings(position)`.
+    Returns: the texture; still 0 everywhere where nothing at all is shown.
+    Source: this project's; inverse distance weighting is Shepard's (1968).
+    """
+    counted = shown * _lie_at_their_place(position, texture.shape[-1])
+    known = torch.cat([texture * counted, counted], dim=1)
+    places = F.adaptive_avg_pool2d(known, FILL_FROM).flatten(2)
+    spread = (places @ surroundings.to(places.dtype)).unflatten(2, (FILL_TO, FILL_TO))
+    colours = spread[:, :-1] / spread[:, -1:].clamp_min(torch.finfo(spread.dtype).tiny)
+    # not between places: neighbours in the texture may lie far apart on the body
+    filled = F.interpolate(colours, texture.shape[2:], mode="nearest")
+    return torch.where(shown > 0, texture, filled)
+
+
+def measure_surroundings(position: Float[Tensor, "256 256 3"]) -> Float[Tensor, "N M"]:
+    """How much each of FILL_FROM**2 places of the texture counts for each of FILL_TO**2.
+
+    Falls with the sixth power of their distance on the body, so that the nearest decide.
+
+    Args:
+        position: of `UVLayout`, in metres.
+    """
+    given, wanted = (
+        position[step // 2 :: step, step // 2 :: step].reshape(-1, 3)
+        for step in (position.shape[0] // count for count in (FILL_FROM, FILL_TO))
+    )
+    squared = torch.cdist(given, wanted).square()
+    return (FILL_METRES**2 / (squared + FILL_METRES**2)) ** 3
+
+
+def _lie_at_their_place(position: Float[Tensor, "256 256 3"], size: int) -> Bool[Tensor, "T T"]:
+    """Whether a texel belongs to the place whose share of the texture it lies in.
+
+    Places at the border of a chart hold texels of another part of the body, too.
+    """
+    step = position.shape[0] // FILL_FROM
+    places = position[step // 2 :: step, step // 2 :: step]
+    own = places.repeat_interleave(step, 0).repeat_interleave(step, 1)
+    near = (position - own).norm(dim=-1) < PLACE_METRES
+    return F.interpolate(near[None, None].float(), (size, size), mode="nearest")[0, 0] > 0
 
 
 def _resize_twins(twin: Int64[Tensor, "S S"], size: int) -> Int64[Tensor, " L"]:

@@ -58,6 +58,7 @@ def save_checkpoint(
     temporary = path.with_name(f".{path.name}.part")
     try:
         save_file(state, temporary, metadata=metadata)
+        temporary.chmod(0o644)  # safetensors writes for the owner only
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)

@@ -23,7 +23,7 @@ def test_defaults_are_the_papers() -> None:
         "image_size": 256,
         "alpha": False,
         "visibility_input": True,
-        "mirrored": False,
+        "prefilled": False,
         "colour_shortcut": False,
     }
 
@@ -32,7 +32,7 @@ def test_presets() -> None:
     assert set(PRESETS) == {"paper", "lite"}
     assert ModelConfig.preset("paper") == ModelConfig()
     assert ModelConfig.preset("lite") == ModelConfig(
-        feature_width=32, render_width=32, mirrored=True, colour_shortcut=True
+        feature_width=32, render_width=32, prefilled=True, colour_shortcut=True
     )
 
 

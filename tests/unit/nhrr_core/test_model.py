@@ -14,7 +14,9 @@ from nhrr_core import (
     NeuralReRenderer,
     ShapeError,
     extract_texture,
+    fill_texture,
     load_uv_layout,
+    measure_surroundings,
     mirror_texture,
     normalise_iuv,
     sample_features,
@@ -141,17 +143,18 @@ def test_the_shortcut_adds_the_texture(photo: Tensor, iuv: Tensor, variant: str)
     assert torch.equal(model.encode(photo, iuv)[:, :3], texture)
 
 
-def test_a_mirrored_texture_is_what_feature_net_starts_from(photo: Tensor, iuv: Tensor) -> None:
+def test_a_filled_texture_is_what_feature_net_starts_from(photo: Tensor, iuv: Tensor) -> None:
     torch.manual_seed(0)
-    model = small(mirrored=True, colour_shortcut=True)
+    model = small(prefilled=True, colour_shortcut=True)
     assert model.feature_net is not None
     texture, visibility = extract_texture(photo, iuv, model.charts, 64)
     layout = load_uv_layout()
     mirrored, shown = mirror_texture(texture, visibility, layout.side_twin, layout.depth_twin)
     assert shown.sum() > visibility.sum()
-    inputs = torch.cat([mirrored, visibility, shown], dim=1)
-    expected = model.feature_net(inputs)
-    expected[:, :3] += mirrored
+    filled = fill_texture(mirrored, shown, layout.position, measure_surroundings(layout.position))
+    assert (filled != mirrored).any()
+    expected = model.feature_net(torch.cat([filled, visibility, shown], dim=1))
+    expected[:, :3] += filled
     assert torch.allclose(model.encode_texture(texture, visibility), expected, atol=1e-6)
 
 

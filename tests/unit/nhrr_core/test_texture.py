@@ -10,8 +10,10 @@ from nhrr_core import (
     IuvError,
     ShapeError,
     extract_texture,
+    fill_texture,
     keep_parts,
     load_uv_layout,
+    measure_surroundings,
     merge_textures,
     mirror_texture,
     sample_features,
@@ -494,3 +496,64 @@ def test_what_is_seen_stays_and_images_do_not_mix() -> None:
         assert torch.equal(found[image : image + 1], alone[0])
     nothing = torch.zeros_like(visibility)
     assert not mirror(torch.zeros_like(texture), nothing)[1].any()
+
+
+# Filling
+
+
+def fill(texture: Tensor, shown: Tensor) -> Tensor:
+    position = load_uv_layout().position
+    return fill_texture(texture, shown, position, measure_surroundings(position))
+
+
+def test_filling_equals_loops() -> None:
+    """Some places, each a mean of all that are known, by distance on the body."""
+    generator = torch.Generator().manual_seed(0)
+    shown = (torch.rand(1, 1, 32, 32, generator=generator) > 0.8).float()
+    texture = torch.rand(1, 1, 32, 32, generator=generator) * shown
+    position = load_uv_layout().position
+    given, wanted, texel = position[4::8, 4::8], position[2::8, 2::8], position[::8, ::8]
+    known = [
+        (row, column)
+        for row, column in shown[0, 0].nonzero().tolist()
+        if (given[row, column] - texel[row, column]).norm() < 0.12
+    ]
+    assert len(known) < shown.sum(), "some lie at the border of a chart"
+    found = fill(texture, shown)
+    for row, column in (shown[0, 0] == 0).nonzero()[::100].tolist():
+        total = weights = 0.0
+        for other in known:
+            squared = sum(float(d) ** 2 for d in wanted[row, column] - given[other])
+            weight = (0.02**2 / (squared + 0.02**2)) ** 3
+            total, weights = total + weight * float(texture[0, 0][other]), weights + weight
+        assert float(found[0, 0, row, column]) == pytest.approx(total / weights, abs=1e-3)
+
+
+@pytest.mark.parametrize("size", [128, 256])
+def test_filled_places_look_like_their_surroundings(size: int) -> None:
+    """A texture of places on the body, of which one texel in ten is seen."""
+    layout = load_uv_layout()
+    place = F.interpolate(layout.position.permute(2, 0, 1)[None], (size, size), mode="nearest")
+    generator = torch.Generator().manual_seed(0)
+    shown = (torch.rand(1, 1, size, size, generator=generator) > 0.9).float()
+    found = fill(place * shown, shown)
+    distance = (found - place).norm(dim=1)[shown[:, 0] == 0]
+    assert distance.median() < 0.05, "metres"
+    assert torch.equal(found * shown, place * shown)
+
+
+def test_a_limb_of_which_nothing_is_seen_takes_its_neighbour_s_colour() -> None:
+    layout = load_uv_layout()
+    upper, lower = (
+        torch.isin(layout.part, torch.tensor(parts)).float()[None, None]
+        for parts in ((7, 8, 9, 10), (11, 12, 13, 14))
+    )
+    head = torch.isin(layout.part, torch.tensor((23, 24))).float()[None, None]
+    found = fill(upper * 0.5 - head, upper + head)
+    share = ((found[lower > 0] - 0.5).abs() < 0.05).float().mean()
+    assert share > 0.95, "the rest are places that span the border of a chart"
+
+
+def test_nothing_shown_stays_nothing() -> None:
+    nothing = torch.zeros(2, 3, 64, 64)
+    assert not fill(nothing, nothing[:, :1]).any()
