@@ -6,16 +6,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
+import av
 import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.media.formats import choose_format
+from motion_transfer.media.formats import CODECS
 from motion_transfer.media.image import write_png
 from motion_transfer.media.iuv_image import CHANNEL_ORDERS, ChannelOrder
 from motion_transfer.media.publish import check_destination, publish, work_folder
-from motion_transfer.media.segments import join_segments, open_segment
 
 IUV_ENDINGS = ("", ".png", ".mkv", ".npy")
 VIDEO_RATE = Fraction(30)  # where the frames come without a rate
@@ -118,13 +119,17 @@ def _write_png(frames: Iterable[Frame], path: Path, settings: IuvFormat) -> None
 
 
 def _write_video(frames: Iterable[Frame], path: Path, settings: IuvFormat) -> None:
-    video, rate = choose_format(path, codec="ffv1", crf=None), settings.frame_rate or VIDEO_RATE
-    part = path.with_suffix(".nut")
-    size = (settings.width, settings.height)
-    with open_segment(part, video, size=size, rate=rate, first=0) as segment:
+    codec = CODECS["ffv1"]
+    with av.open(str(path), "w") as container:
+        rate = settings.frame_rate or VIDEO_RATE
+        stream = cast(av.VideoStream, container.add_stream(codec.encoder, rate, codec.options))
+        stream.width, stream.height = settings.width, settings.height
+        stream.pix_fmt = codec.pixel_format
+        stream.codec_context.thread_count = 1
         for frame in frames:
-            segment.write(_in_order(frame, settings.order))
-    join_segments([(part, settings.frame_count)], path, video, rate)
+            rgb = av.VideoFrame.from_ndarray(_in_order(frame, settings.order), format="rgb24")
+            container.mux(stream.encode(rgb.reformat(format=codec.pixel_format)))
+        container.mux(stream.encode(None))
 
 
 def _write_array(frames: Iterable[Frame], path: Path, settings: IuvFormat) -> None:
