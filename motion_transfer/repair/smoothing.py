@@ -104,7 +104,25 @@ def _move(other: Frame, here: Frame) -> tuple[Frame, Bool[np.ndarray, "H W"]]:
     there, back = dis.calc(grey_here, grey_other, None), dis.calc(grey_other, grey_here, None)  # type: ignore[call-overload]
     rows, columns, inside = _targets(there)
     gap = np.abs(there + back[rows, columns]).max(-1)
-    return other[rows, columns], inside & (gap <= RETURN_PX)
+    return _sample(other, there, other[rows, columns]), inside & (gap <= RETURN_PX)
+
+
+def _sample(other: Frame, flow: Flow, nearest: Frame) -> Frame:
+    """The part of the nearest pixel, with U and V between the pixels around that have this part."""
+    height, width = flow.shape[:2]
+    y, x = np.arange(height)[:, None] + flow[..., 1], np.arange(width) + flow[..., 0]
+    top, left = np.floor(y).astype(np.int64), np.floor(x).astype(np.int64)
+    total, weights = np.zeros((height, width, 2), np.float32), np.zeros((height, width), np.float32)
+    for down, right in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        corner = other[(top + down).clip(0, height - 1), (left + right).clip(0, width - 1)]
+        share = np.abs(1 - down - (y - top)) * np.abs(1 - right - (x - left))
+        share = np.where(corner[..., 0] == nearest[..., 0], share, 0).astype(np.float32)
+        total += corner[..., 1:] * share[..., None]
+        weights += share
+    known = weights > 0
+    sampled = nearest.copy()
+    sampled[known, 1:] = np.rint(total[known] / weights[known][:, None])
+    return sampled
 
 
 def _targets(flow: Flow) -> tuple[np.ndarray, np.ndarray, Bool[np.ndarray, "H W"]]:
