@@ -19,6 +19,7 @@ COMMANDS = {
     "train": "Train the network, or fine-tune it on one person.",
     "people": "Synthetic people: photos with exact IUV, and drivers from motion.",
     "eval": "Score renderers, and other methods' pictures, on the same pairs.",
+    "iuv": "Convert IUV between formats, and repair it.",
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",
     "info": "Versions, device, renderers, sizes of a run; part names.",
 }

@@ -45,8 +45,8 @@ output_option = section("Output")
     "--driver",
     type=FILE,
     required=True,
-    help="Folder of IUV images, one IUV image, lossless IUV video, .npy, .npz, or people:MOTION"
-    " (such as people:walk,frames=60; see `mt people drive -h`).",
+    help="Folder of IUV images, one IUV image, lossless IUV video, .npy, .npz, detectron2's"
+    " results.pkl, or people:MOTION (such as people:walk,frames=60; see `mt people drive -h`).",
 )
 @driver_option(
     "--driver-person", default="largest", metavar="WHO", help="Whom to follow; as --person."
@@ -58,9 +58,9 @@ output_option = section("Output")
 )
 @driver_option(
     "--missing",
-    default="fail",
-    metavar="fail|hold",
-    help="Numbers missing in a folder: stop (default), or repeat the frame before.",
+    metavar="WHAT",
+    help="Frames that show nobody, and numbers missing in a folder: hold (repeat the frame"
+    " before), background, or fail. Default: background for the former, fail for the latter.",
 )
 @driver_option("--frames", metavar="A:B", help="Only these frames, counted from 0, B excluded.")
 @garment_option(

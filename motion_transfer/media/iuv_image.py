@@ -18,6 +18,11 @@ from jaxtyping import UInt8
 
 from motion_transfer.errors import IuvFileError
 from motion_transfer.media.image import read_bytes
+from motion_transfer.media.iuv_lookalikes import (
+    explain_grey,
+    explain_picture,
+    explain_scaled_uv,
+)
 from nhrr_core.iuv import PART_COUNT
 
 ChannelOrder = Literal["iuv", "vui"]
@@ -53,7 +58,8 @@ def read_raw_iuv(path: Path, what: str = "IUV") -> Raw:
             f"{what} {path} has {pixels.dtype.itemsize * 8} bits a channel; an IUV image has 8"
         )
     if pixels.ndim != 3 or pixels.shape[2] < 3:
-        raise IuvFileError(f"{what} {path} is grey; an IUV image has three channels, I, U and V")
+        grey = pixels if pixels.ndim == 2 else pixels[..., 0]
+        raise IuvFileError(f"{what} {path} {explain_grey(grey, path.stem)}")
     return cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGB if pixels.shape[2] == 4 else cv2.COLOR_BGR2RGB)
 
 
@@ -64,20 +70,25 @@ def decide_order(frames: Iterable[tuple[str, Raw]], what: str) -> ChannelOrder |
         frames: pairs of a place (for messages) and a raw frame, lazily.
         what: the driver or source, for messages.
     Returns: the order; None if every pixel of every frame is background.
-    Raises: IuvFileError if neither order is possible, or if both stay possible to the end.
+    Raises: IuvFileError if neither order is possible, if both stay possible to the end, or if the
+        frame that decides has its U and V scaled by their minimum and maximum.
     """
     seen = False
     for where, raw in frames:
         first, last = int(raw[..., 0].max()), int(raw[..., 2].max())
         if first > PART_COUNT and last > PART_COUNT:
+            known = explain_picture(raw)
             raise IuvFileError(
                 f"{where} is not an IUV image: neither its first nor its last channel stays within"
                 f" 0..{PART_COUNT} (they reach {first} and {last})"
+                + (f"; {known}" if known else "")
             )
-        if first > PART_COUNT:
-            return "vui"
-        if last > PART_COUNT:
-            return "iuv"
+        if first > PART_COUNT or last > PART_COUNT:
+            order: ChannelOrder = "vui" if first > PART_COUNT else "iuv"
+            scaled = explain_scaled_uv(raw if order == "iuv" else raw[..., ::-1])
+            if scaled:
+                raise IuvFileError(f"{where} is not an IUV image: {scaled}")
+            return order
         seen = seen or bool(raw.any())
     if seen:
         raise IuvFileError(

@@ -1,4 +1,7 @@
-"""Drivers: IUV frames from a folder, one image, a lossless video or an array, decoded lazily.
+"""Drivers: IUV frames of every kind that circulates, decoded lazily.
+
+Folders of images or arrays, one image, a lossless video, a NumPy stack (also quantised results and
+global UV), a detectron2 dump. What only looks like IUV is refused with the reason.
 
 A stream knows its length before anything is decoded, and any number of threads may read from it
 at once, each its own range.
@@ -7,10 +10,6 @@ at once, each its own range.
 from __future__ import annotations
 
 import re
-import shutil
-import tempfile
-import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
@@ -20,6 +19,8 @@ from typing import Literal
 import numpy as np
 
 from motion_transfer.errors import InputError, IuvFileError
+from motion_transfer.media.iuv_array import ARRAY_SUFFIXES, ArrayFolder, ArrayStream
+from motion_transfer.media.iuv_dump import DUMP_SUFFIXES, DumpStream
 from motion_transfer.media.iuv_image import (
     CHANNEL_ORDERS,
     IUV_SUFFIXES,
@@ -32,47 +33,35 @@ from motion_transfer.media.iuv_image import (
 from motion_transfer.media.iuv_video import VideoStream
 from motion_transfer.media.stream import IuvStream
 
-Missing = Literal["fail", "hold"]
+Missing = Literal["fail", "hold", "background"]
 
 
 class ImageStream(IuvStream):
-    """A folder of IUV images in natural order, or a single one."""
+    """A folder of IUV images in natural order, or a single one.
 
-    def __init__(self, path: Path, files: list[Path], gaps: tuple[int, ...] = ()) -> None:
+    A missing number's place is taken by the file before it, or, in `blank`, by nobody.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        files: list[Path],
+        gaps: tuple[int, ...] = (),
+        blank: frozenset[int] = frozenset(),
+    ) -> None:
         kind = "folder of IUV images" if path.is_dir() else "IUV image"
         super().__init__(path, kind, len(files))
         self.files = files
         self.gaps = gaps
+        self._blank = blank
 
     def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
         for index in range(start, stop):
-            yield read_raw_iuv(self.files[index], f"frame {index},")
+            raw = read_raw_iuv(self.files[index], f"frame {index},")
+            yield np.zeros_like(raw) if index in self._blank else raw
 
     def where(self, index: int) -> str:
         return f"frame {index}, {self.files[index]}"
-
-
-class ArrayStream(IuvStream):
-    """A NumPy stack, N x H x W x 3 or N x 3 x H x W uint8, mapped rather than loaded."""
-
-    def __init__(self, path: Path) -> None:
-        self._frames = _map_array(path)
-        shape = self._frames.shape
-        if self._frames.dtype != np.uint8 or len(shape) != 4 or 3 not in (shape[1], shape[3]):
-            raise IuvFileError(
-                f"driver {path} holds {self._frames.dtype} {list(shape)}; an IUV stack is uint8,"
-                " N x H x W x 3 or N x 3 x H x W"
-            )
-        if shape[3] != 3:
-            self._frames = self._frames.transpose(0, 2, 3, 1)
-        super().__init__(path, "IUV array", shape[0])
-
-    def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
-        for index in range(start, stop):
-            yield np.ascontiguousarray(self._frames[index])
-
-    def where(self, index: int) -> str:
-        return f"frame {index} of {self.path}"
 
 
 class IuvReader:
@@ -99,18 +88,24 @@ class IuvReader:
 
 
 def open_stream(path: Path, *, missing: Missing = "fail") -> IuvStream:
-    """Open a driver by what it is: a folder, an image, a `.npy`/`.npz` stack, or a video.
+    """Open a driver by what it is: a folder, an image, an array, a detectron2 dump, or a video.
 
+    Args:
+        missing: what a number missing from a folder does: `fail`, `hold` (the frame before is
+            repeated) or `background` (a frame without anybody).
     Raises: InputError if it is missing or empty; IuvFileError if it is not IUV.
     """
     if not path.exists():
         raise InputError(f"driver {path} does not exist")
+    stream: IuvStream
     if path.is_dir():
-        stream: IuvStream = _open_folder(path, missing)
+        stream = _open_folder(path, missing)
     elif path.suffix.lower() in IUV_SUFFIXES:
         stream = ImageStream(path, [path])
-    elif path.suffix.lower() in (".npy", ".npz"):
+    elif path.suffix.lower() in ARRAY_SUFFIXES:
         stream = ArrayStream(path)
+    elif path.suffix.lower() in DUMP_SUFFIXES:
+        stream = DumpStream(path)
     elif path.suffix.lower() in (".jpg", ".jpeg", ".webp"):
         read_raw_iuv(path, "driver")  # raises, with the reason
         raise IuvFileError(f"driver {path} may be lossy; export the IUV as PNG")
@@ -129,12 +124,38 @@ def open_reader(stream: IuvStream, order: ChannelOrder | None = None) -> IuvRead
     if order is not None and order not in CHANNEL_ORDERS:
         raise InputError(f"channel order {order!r}; supported are {', '.join(CHANNEL_ORDERS)}")
     height, width = next(iter(stream.read_raw(0, 1))).shape[:2]
+    order = stream.order or order
     if order is None:
         frames = enumerate(stream.read_raw(0, stream.frame_count))
         order = decide_order(((stream.where(i), raw) for i, raw in frames), str(stream.path))
     if order is None:
         raise InputError(f"{stream.path}: no person in any frame, every pixel is background")
     return IuvReader(stream, order, height, width)
+
+
+def read_single_iuv(path: Path, order: ChannelOrder | None, what: str) -> np.ndarray | None:
+    """The IUV of one picture from any kind of file, H x W x 3 uint8; None if it shows nobody.
+
+    Args:
+        order: force the channel order; None: find it out.
+        what: what the file is wanted for, for messages.
+    Raises: IuvFileError if it is not IUV, or holds several frames.
+    """
+    where = f"{what} {path}"
+    if path.suffix.lower() not in (*ARRAY_SUFFIXES, *DUMP_SUFFIXES):
+        raw = read_raw_iuv(path, what)
+    else:
+        if not path.exists():
+            raise InputError(f"{where} does not exist")
+        stream = open_stream(path)
+        if stream.frame_count != 1:
+            raise IuvFileError(
+                f"{where} holds {stream.frame_count} frames, and one is wanted; take it out with"
+                " `mt iuv convert`"
+            )
+        raw, order = next(iter(stream.read_raw(0, 1))), stream.order or order
+    order = order or decide_order([(where, raw)], where)
+    return None if order is None else to_iuv(raw, order, where)
 
 
 def list_gaps(gaps: tuple[int, ...]) -> str:
@@ -148,26 +169,32 @@ def natural_key(name: str) -> list[tuple[int, int | str]]:
     return [(0, int(s)) if s.isdigit() else (1, s) for s in re.findall(r"\d+|\D+", name)]
 
 
-def _open_folder(path: Path, missing: Missing) -> ImageStream:
-    images = [
-        file
-        for file in path.iterdir()
-        if file.suffix.lower() in IUV_SUFFIXES and not file.name.startswith(".")
-    ]
+def _open_folder(path: Path, missing: Missing) -> IuvStream:
+    """Its IUV images, those named so first; without images, its arrays."""
+    inside = sorted(
+        (file for file in path.iterdir() if not file.name.startswith(".")),
+        key=lambda file: natural_key(file.name),
+    )
+    images = [file for file in inside if file.suffix.lower() in IUV_SUFFIXES]
     named = [file for file in images if file.stem.lower().endswith("iuv")]
-    files = sorted(named or images, key=lambda file: natural_key(file.name))
-    if not files:
-        lossy = next((f for f in path.iterdir() if f.suffix.lower() in (".jpg", ".jpeg")), None)
-        if lossy is not None:
-            read_raw_iuv(lossy, "frame")  # raises, with the reason
+    persons = [file for file in images if file.stem.lower().endswith("_inds")]
+    files = named or [file for file in images if file not in persons]
+    arrays = [file for file in inside if file.suffix.lower() in ARRAY_SUFFIXES]
+    if not (files or arrays):
+        lossy = [file for file in inside if file.suffix.lower() in (".jpg", ".jpeg")]
+        for file in (*persons[:1], *lossy[:1]):
+            read_raw_iuv(file, "frame")  # raises, with the reason
         raise InputError(f"driver {path} holds no IUV images ({', '.join(IUV_SUFFIXES)})")
-    held, gaps = _find_gaps(files)
+    held, gaps = _find_gaps(files or arrays)
     if gaps and missing == "fail":
         raise InputError(
             f"driver {path}: {list_gaps(gaps)}; add the files, or repeat the frame before with"
             " --missing hold"
         )
-    return ImageStream(path, held, gaps)
+    repeated = (i for i in range(1, len(held)) if held[i] == held[i - 1])
+    blank = frozenset(repeated if missing == "background" else ())
+    kind = ImageStream if files else ArrayFolder
+    return kind(path, held, gaps, blank)
 
 
 def _find_gaps(files: list[Path]) -> tuple[list[Path], tuple[int, ...]]:
@@ -189,21 +216,3 @@ def _find_gaps(files: list[Path]) -> tuple[list[Path], tuple[int, ...]]:
         gaps += between
         held += [held[-1]] * len(between) + [file]
     return held, tuple(gaps)
-
-
-def _map_array(path: Path) -> np.ndarray:
-    """The array of a `.npy`, or the only one of a `.npz`, mapped from disk."""
-    try:
-        if path.suffix.lower() == ".npy":
-            return np.load(path, mmap_mode="r", allow_pickle=False)
-        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
-            names = archive.namelist()
-            name = names[0] if len(names) == 1 else "iuv.npy"
-            if name not in names:
-                raise IuvFileError(f"driver {path} holds {len(names)} arrays; name one of them iuv")
-            unpacked = Path(folder) / "iuv.npy"  # unlinked at once; the mapping keeps it alive
-            with archive.open(name) as packed, unpacked.open("wb") as file:
-                shutil.copyfileobj(packed, file)
-            return np.load(unpacked, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error) as error:
-        raise IuvFileError(f"driver {path} is not a whole NumPy array: {error}") from error

@@ -14,6 +14,7 @@ from av.error import FFmpegError
 
 from motion_transfer.errors import IuvFileError
 from motion_transfer.media.iuv_image import Raw
+from motion_transfer.media.iuv_lookalikes import explain_picture
 from motion_transfer.media.stream import IuvStream
 
 LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
@@ -37,7 +38,7 @@ class VideoStream(IuvStream):
                     raise IuvFileError(f"driver {path} has no video in it")
                 stream = container.streams.video[0]
                 codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
-                _check_lossless(path, codec, pixels)
+                _check_lossless(path, container, codec, pixels)
                 times = sorted(
                     (packet.pts, packet.duration or 0)
                     for packet in container.demux(stream)
@@ -46,7 +47,9 @@ class VideoStream(IuvStream):
                 self._timestamps = [pts for pts, _ in times]
                 rate = stream.average_rate or stream.guessed_rate
                 if times and rate and stream.time_base:
-                    _check_whole(path, container, sum(times[-1]) * stream.time_base, 1 / rate)
+                    last, duration = (ticks * stream.time_base for ticks in times[-1])
+                    # Matroska does not always say how long the last frame is shown
+                    _check_whole(path, container, last + (duration or 1 / rate), 1 / rate)
         except FFmpegError as error:
             raise IuvFileError(
                 f"driver {path} is not a readable video: {error.strerror}"
@@ -100,8 +103,11 @@ def _decode_intact(container: InputContainer, stream: av.VideoStream) -> Iterato
         yield frame
 
 
-def _check_lossless(path: Path, codec: str, pixels: str) -> None:
+def _check_lossless(path: Path, container: InputContainer, codec: str, pixels: str) -> None:
     if codec not in LOSSLESS_CODECS:
+        known = _explain_first_frame(container)
+        if known:
+            raise IuvFileError(f"driver {path} is not IUV: {known}")
         raise IuvFileError(
             f"driver {path} is compressed with {codec}, which destroys part indices;"
             f" {LOSSLESS_REMEDY}"
@@ -111,6 +117,12 @@ def _check_lossless(path: Path, codec: str, pixels: str) -> None:
             f"driver {path} stores {pixels} pixels, and the conversion to them already destroyed"
             f" part indices; {LOSSLESS_REMEDY}"
         )
+
+
+def _explain_first_frame(container: InputContainer) -> str | None:
+    """What the pictures of a lossy video are, if they are known to be mistaken for IUV."""
+    frame = next(container.decode(video=0), None)
+    return None if frame is None else explain_picture(frame.to_ndarray(format="rgb24"))
 
 
 def _check_whole(

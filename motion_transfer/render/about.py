@@ -160,6 +160,8 @@ def _describe_iuv(reader: IuvReader) -> Facts:
     if stream.frame_rate:
         seconds = float(stream.frame_count / stream.frame_rate)
         facts["frame rate"] = f"{stream.frame_rate} ({seconds:.2f} s)"
+    if stream.notes:
+        facts["note"] = "; ".join(stream.notes)
     facts["missing numbers"] = list(stream.gaps) or "none"
     facts["people a frame"] = {f"{n} people": f"{f} frames" for n, f in sorted(crowd.items())}
     shares = pixels[1:] / max(1, pixels[1:].sum())

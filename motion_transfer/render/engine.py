@@ -163,7 +163,12 @@ class Engine:
         """The chunk's IUV frames with only the followed person in them."""
         first = self._plan.first
         frames = self._reader.read(first + chunk.start, first + chunk.stop)
+        held, shown = None, None
         for plan, iuv in zip(self._plan.frames[chunk.start : chunk.stop], frames, strict=True):
+            if plan.held is not None:
+                if plan.held != held:
+                    held, shown = plan.held, next(self._reader.read(plan.held, plan.held + 1))
+                iuv = shown if shown is not None else iuv
             if plan.alone:
                 yield iuv
             elif plan.person is None:

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import get_args
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_image import CHANNEL_ORDERS, ChannelOrder
@@ -41,7 +42,9 @@ class RenderOptions:
         weights: a safetensors checkpoint, for `nhrr`.
         person, driver_person: `largest`, an index from the left (0 first), or `x0,y0,x1,y1` in px.
         iuv_order, source_iuv_order: force the channel order, `iuv` or `vui`.
-        missing: what a gap in the numbering of a folder does, `fail` or `hold`.
+        missing: what becomes of driver frames in which nobody is found, and of numbers missing
+            from a folder: `fail`, `hold` (the frame before is repeated) or `background`. None:
+            missing numbers fail, frames without anybody are background.
         frames: half-open range of the driver's frames, either end open.
         frame_rate: frames per second; None: the driver's own, or 30.
         codec, crf: of the video; None: the container's default.
@@ -66,7 +69,7 @@ class RenderOptions:
     driver_person: str = "largest"
     iuv_order: ChannelOrder | None = None
     source_iuv_order: ChannelOrder | None = None
-    missing: Missing = "fail"
+    missing: Missing | None = None
     frames: tuple[int | None, int | None] = (None, None)
     frame_rate: Fraction | None = None
     codec: str | None = None
@@ -85,7 +88,7 @@ class RenderOptions:
             ("renderer", (None, *RENDERERS)),
             ("iuv_order", (None, *CHANNEL_ORDERS)),
             ("source_iuv_order", (None, *CHANNEL_ORDERS)),
-            ("missing", ("fail", "hold")),
+            ("missing", (None, *get_args(Missing))),
             ("size", SIZES),
         ):
             if getattr(self, name) not in allowed:

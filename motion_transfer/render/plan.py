@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.iuv_stream import IuvReader
-from motion_transfer.render.person import People, Person, choose_person, find_people, follow
+from motion_transfer.media.iuv_stream import IuvReader, Missing
+from motion_transfer.render.missing import (
+    FramePlan,
+    hold_frames,
+    list_stretches,
+    missing_stretches,
+)
+from motion_transfer.render.person import People, choose_person, find_people, follow
 from motion_transfer.render.window import Window, plan_window
 
 CHUNK_FRAMES = 48
@@ -25,14 +31,6 @@ class Chunk:
     index: int
     start: int
     stop: int
-
-
-@dataclass(frozen=True)
-class FramePlan:
-    """Who is rendered in one frame: nobody (None), or a person, alone in it or to be isolated."""
-
-    person: Person | None
-    alone: bool
 
 
 @dataclass(frozen=True)
@@ -57,6 +55,11 @@ class DriverPlan:
             Chunk(index, start, min(start + CHUNK_FRAMES, len(self.frames)))
             for index, start in enumerate(starts)
         ]
+
+    @property
+    def missing(self) -> list[tuple[int, int]]:
+        """Half-open ranges of driver frames in which the person was not found."""
+        return missing_stretches(self.frames, self.first)
 
 
 def frame_range(frames: tuple[int | None, int | None], count: int, where: str) -> range:
@@ -97,10 +100,16 @@ def plan_driver(
     person: str,
     workers: int,
     done: Callable[[int], None],
+    missing: Missing | None = None,
 ) -> DriverPlan:
     """Follow the chosen person through the driver and lay the window around the whole path.
 
-    Raises: InputError if the first frame, or every frame, is empty; IuvFileError on a bad frame.
+    Args:
+        missing: what becomes of frames in which the person is not found: `fail`, `hold` (the frame
+            before is repeated; at the start, the first one with somebody) or `background`; None:
+            `background`, but somebody has to be in the first frame.
+    Raises: InputError if nobody is in any frame, or in one where `missing` asks for somebody;
+        IuvFileError on a bad frame.
     """
     path_name = str(reader.stream.path)
     chosen = frame_range(frames, reader.stream.frame_count, path_name)
@@ -110,26 +119,24 @@ def plan_driver(
         raise InputError(
             f"{path_name}: no person in any of the frames {chosen.start}:{chosen.stop}"
         )
-    if inhabited > 0:
+    if inhabited > 0 and missing is None:
         raise InputError(
             f"{reader.stream.where(chosen.start)}: no person in the first frame; start with"
-            f" --frames {chosen.start + inhabited}:{chosen.stop}"
+            f" --frames {chosen.start + inhabited}:{chosen.stop}, or add --missing hold or"
+            " --missing background"
         )
-    first = choose_person(people[0], person, reader.stream.where(chosen.start))
-    path = follow(people, first)
+    first = choose_person(people[inhabited], person, reader.stream.where(chosen.start + inhabited))
+    path = [None] * inhabited + follow(people[inhabited:], first)
     plans = tuple(
         FramePlan(who, alone=who is not None and len(who.regions) == found.region_count)
         for who, found in zip(path, people, strict=True)
     )
+    stretches = missing_stretches(plans, chosen.start)
+    if missing == "fail" and stretches:
+        raise InputError(
+            f"{path_name}: nobody at {list_stretches(stretches, chosen.start, frame_rate)}; choose"
+            " other --frames, or add --missing hold or --missing background"
+        )
+    if missing == "hold":
+        plans = hold_frames(plans, chosen.start)
     return DriverPlan(chosen.start, plans, plan_window(path), frame_rate)
-
-
-def empty_stretches(plan: DriverPlan) -> Iterator[tuple[int, int]]:
-    """Half-open ranges of driver frames in which the person cannot be seen."""
-    start = None
-    for index, frame in enumerate((*plan.frames, FramePlan(plan.frames[0].person, True))):
-        if frame.person is None and start is None:
-            start = index
-        elif frame.person is not None and start is not None:
-            yield plan.first + start, plan.first + index
-            start = None

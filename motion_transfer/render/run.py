@@ -27,8 +27,9 @@ from motion_transfer.render.events import (
     Started,
     ignore,
 )
+from motion_transfer.render.missing import list_stretches
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
-from motion_transfer.render.plan import DriverPlan, empty_stretches, frame_range, plan_driver
+from motion_transfer.render.plan import DriverPlan, frame_range, plan_driver
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.sheet import ContactSheet
 from motion_transfer.render.source import Source, prepare_source
@@ -45,6 +46,7 @@ class RenderReport:
         output: the finished file or folder.
         renderer: the one that drew it.
         wall_seconds: the whole run; render_seconds: without planning and loading.
+        missing: half-open ranges of driver frames in which nobody was found.
     """
 
     output: Path
@@ -55,6 +57,7 @@ class RenderReport:
     frame_rate: Fraction
     wall_seconds: float
     render_seconds: float
+    missing: tuple[tuple[int, int], ...] = ()
 
     @property
     def duration_seconds(self) -> float:
@@ -112,7 +115,9 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
         frame_rate=rate,
         wall_seconds=ended - began,
         render_seconds=ended - render_began,
+        missing=tuple(plan.missing),
     )
+    _report_missing(options, plan, listener)
     listener(
         Finished(
             report.output,
@@ -129,7 +134,12 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
 def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, DriverPlan]:
     stream = _open_driver(options, listener)
     if stream.gaps:
-        listener(Notice(f"{list_gaps(stream.gaps)}; each repeats the frame before it"))
+        filled = (
+            "shows nobody" if options.missing == "background" else "repeats the frame before it"
+        )
+        listener(Notice(f"{list_gaps(stream.gaps)}; each {filled}"))
+    for note in stream.notes:
+        listener(Notice(note))
     reader = open_reader(stream, options.iuv_order)
     chosen = frame_range(options.frames, stream.frame_count, str(options.driver))
     listener(Stage("scan", len(chosen)))
@@ -140,15 +150,23 @@ def _plan(options: RenderOptions, listener: Listener) -> tuple[IuvReader, Driver
         person=options.driver_person,
         workers=options.worker_count,
         done=lambda count: listener(FramesDone(count)),
+        missing=options.missing,
     )
-    for start, stop in empty_stretches(plan):
-        listener(Notice(f"frames {start}:{stop} of the driver show nobody: background only"))
     return reader, plan
+
+
+def _report_missing(options: RenderOptions, plan: DriverPlan, listener: Listener) -> None:
+    stretches = plan.missing
+    if stretches:
+        count = sum(stop - start for start, stop in stretches)
+        shown = "the frame before" if options.missing == "hold" else "background only"
+        times = list_stretches(stretches, plan.first, plan.frame_rate)
+        listener(Notice(f"nobody found in {count} of {len(plan.frames)} frames, {shown}: {times}"))
 
 
 def _open_driver(options: RenderOptions, listener: Listener) -> IuvStream:
     if not is_motion(options.driver):
-        return open_stream(options.driver, missing=options.missing)
+        return open_stream(options.driver, missing=options.missing or "fail")
     from motion_transfer.people.figure.body import FIRST_USE, is_cached
     from motion_transfer.people.stream import open_motion
 

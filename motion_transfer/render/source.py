@@ -13,7 +13,8 @@ from torch import Tensor
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.image import Photo, read_photo
-from motion_transfer.media.iuv_image import ChannelOrder, decide_order, read_raw_iuv, to_iuv
+from motion_transfer.media.iuv_image import ChannelOrder
+from motion_transfer.media.iuv_stream import read_single_iuv
 from motion_transfer.render.options import Garment, RenderOptions
 from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
@@ -181,20 +182,18 @@ def read_person(
     Raises: InputError if the IUV cannot be read, is of another size, or shows nobody.
     """
     where = f"{what} IUV {path}"
-    raw = read_raw_iuv(path, f"{what} IUV")
-    if raw.shape[:2] != photo.rgb.shape[:2]:
+    iuv = read_single_iuv(path, order, f"{what} IUV")
+    if iuv is None:
+        raise InputError(f"{where}: no person in it, every pixel is background")
+    if iuv.shape[:2] != photo.rgb.shape[:2]:
         height, width = photo.rgb.shape[:2]
         hint = "make the IUV from this very photo"
-        if photo.turned and raw.shape[1::-1] == (height, width):
+        if photo.turned and iuv.shape[1::-1] == (height, width):
             hint = "the photo was turned upright as its EXIF says, make the IUV from it like that"
         raise InputError(
-            f"{where} is {raw.shape[1]} x {raw.shape[0]}, but {photo.path} is {width} x {height};"
+            f"{where} is {iuv.shape[1]} x {iuv.shape[0]}, but {photo.path} is {width} x {height};"
             f" {hint}"
         )
-    order = order or decide_order([(where, raw)], where)
-    if order is None:
-        raise InputError(f"{where}: no person in it, every pixel is background")
-    iuv = to_iuv(raw, order, where)
     people = find_people(iuv)
     person = choose_person(people, choice, where)
     if len(person.regions) != people.region_count:

@@ -133,10 +133,36 @@ def test_frames_without_anybody_are_background_and_noted(studio, mt) -> None:
         *("--background", "#102030"),
     )
     assert result.code == 0
-    assert result.err == "mt: note: frames 2:4 of the driver show nobody: background only\n"
+    assert result.err == (
+        "mt: note: nobody found in 2 of 6 frames, background only: 0:00.07-0:00.13 (frames 2:4)\n"
+    )
     rendered = frames_of(output)
     assert (rendered[2:4] == (16, 32, 48)).all()
     assert (rendered[[0, 1, 4, 5]] != (16, 32, 48)).any(axis=(1, 2, 3)).all()
+
+
+def test_frames_without_anybody_can_be_held(studio, mt) -> None:
+    """Chunks begin at 48: there the frame to repeat is read from the chunk before."""
+    frames = studio.walk(50)
+    frames[[0, 20, 47, 48, 49]] = 0
+    source, driver, output = studio.source(), studio.driver(frames), studio.folder / "out"
+    result = mt(*("run", "--source", source, "--driver", driver, "-o", output, "--missing", "hold"))
+    assert result.code == 0
+    assert "nobody found in 5 of 50 frames, the frame before: 0:00.00-0:00.03" in result.err
+    rendered = frames_of(output)
+    for held, shown in ((0, 1), (20, 19), (47, 46), (48, 46), (49, 46)):
+        np.testing.assert_array_equal(rendered[held], rendered[shown])
+    assert (rendered[48] != 255).any()
+
+
+def test_frames_without_anybody_can_be_refused(studio, mt) -> None:
+    frames = studio.walk(6)
+    frames[3] = 0
+    source, driver, output = studio.source(), studio.driver(frames), studio.folder / "out"
+    result = mt(*("run", "--source", source, "--driver", driver, "-o", output, "--missing", "fail"))
+    assert result.code == 2
+    assert "nobody at 0:00.10-0:00.13 (frames 3:4); choose" in result.err
+    assert not output.exists()
 
 
 def test_a_held_gap_is_noted_and_repeats(studio, mt) -> None:

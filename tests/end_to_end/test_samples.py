@@ -9,7 +9,10 @@ import pytest
 from PIL import Image
 
 from motion_transfer import RenderReport, render_video
+from motion_transfer.media.global_uv import global_to_iuv, iuv_to_global
+from motion_transfer.media.iuv_convert import ConvertOptions, convert_iuv
 from motion_transfer.media.iuv_image import decide_order, read_raw_iuv, to_iuv
+from motion_transfer.media.iuv_stream import open_reader, open_stream
 from motion_transfer.render.person import choose_person, find_people, isolate
 
 TORSO, LEGS = (1, 2), (7, 8, 9, 10, 11, 12, 13, 14)
@@ -76,3 +79,27 @@ def test_the_left_man_of_a_crowd_walks(samples: Path, tmp_path: Path) -> None:
         legs = typical_colour(picture, iuv, LEGS)
         assert legs.mean() < 90  # dark trousers
         np.testing.assert_allclose(legs, typical_colour(rgb, man, LEGS), atol=25)
+
+
+def test_a_real_driver_survives_every_format(samples: Path, tmp_path: Path) -> None:
+    source, names = samples / "drivers/walk_turn_iuv", ("out", "out.mkv", "out.npy")
+    for name, before in zip(names, (source, *(tmp_path / name for name in names)), strict=False):
+        convert_iuv(ConvertOptions(source=before, output=tmp_path / name))
+    first, last = (open_reader(open_stream(path)) for path in (source, tmp_path / "out.npy"))
+    for frame, same in zip(first.read(0, 90), last.read(0, 90), strict=True):
+        np.testing.assert_array_equal(frame, same)
+
+
+@pytest.mark.parametrize(
+    "name", ["drivers/walk_turn_iuv/0010_IUV.png", "densepose_demo/demo_im_IUV.png"]
+)
+def test_global_uv_of_real_people_gives_nearly_every_pixel_back(samples: Path, name: str) -> None:
+    """What differs lies off a chart's surface, where the table repeats its rim."""
+    iuv = read_iuv(samples / name)
+    back, _ = global_to_iuv(iuv_to_global(iuv), "sample")
+    body = iuv[..., 0] > 0
+    np.testing.assert_array_equal(back[..., 0], iuv[..., 0])
+    assert (back == iuv).all(-1)[body].mean() > 0.99
+    np.testing.assert_allclose(
+        iuv_to_global(back)[body], iuv_to_global(iuv)[body], atol=1e-6, rtol=0
+    )

@@ -22,7 +22,15 @@ PATIENCE_SECONDS = 1.5  # it takes 0.2 on an idle machine
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--help"], ["--version"], ["run", "--help"], ["demo", "-h"], ["info", "-h"], ["eval", "-h"]],
+    [
+        ["--help"],
+        ["--version"],
+        ["run", "--help"],
+        ["demo", "-h"],
+        ["info", "-h"],
+        ["eval", "-h"],
+        ["iuv", "repair", "-h"],
+    ],
 )
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     began = time.perf_counter()

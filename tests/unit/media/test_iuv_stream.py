@@ -201,7 +201,7 @@ def broken(studio, kind: str) -> Path:
     elif kind == "float.npy":
         np.save(path, np.zeros((2, 8, 8, 3), np.float32))
     elif kind == "flat.npy":
-        np.save(path, np.zeros((8, 8, 3), np.uint8))
+        np.save(path, np.zeros((8, 8), np.uint8))
     elif kind == "objects.npy":
         np.save(path, np.array([{}], object), allow_pickle=True)
     elif kind == "none.npy":
@@ -239,7 +239,7 @@ def broken(studio, kind: str) -> Path:
         ("photo.jpg", "JPEG file; lossy"),
         ("photo.webp", "WebP file; lossy"),
         ("float.npy", "float32"),
-        ("flat.npy", r"\[8, 8, 3\]"),
+        ("flat.npy", r"uint8 \[8, 8\]; an IUV array is"),
         ("objects.npy", "not a whole NumPy array"),
         ("none.npy", "holds no frames|not a whole NumPy array"),
         ("half.npy", "not a whole NumPy array"),

@@ -9,11 +9,10 @@ import pytest
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.render.missing import FramePlan, list_stretches
 from motion_transfer.render.plan import (
     CHUNK_FRAMES,
     DriverPlan,
-    FramePlan,
-    empty_stretches,
     frame_range,
     plan_driver,
 )
@@ -65,7 +64,7 @@ def test_stretches_without_anybody(studio) -> None:
     frames[[3, 4, 9, 11]] = 0
     planned = plan(studio, frames, frames=(1, None))
     assert planned.first == 1
-    assert list(empty_stretches(planned)) == [(3, 5), (9, 10), (11, 12)]
+    assert planned.missing == [(3, 5), (9, 10), (11, 12)]
 
 
 def test_an_empty_first_frame_says_where_to_start(studio) -> None:
@@ -89,3 +88,33 @@ def test_only_crowded_frames_are_isolated(studio) -> None:
     planned = plan(studio, frames)
     assert [frame.alone for frame in planned.frames] == [True, False]
     assert planned.frames[1].person.x1 < 96
+
+
+def test_held_frames_show_the_last_one_with_somebody(studio) -> None:
+    frames = studio.walk(9)
+    frames[[0, 1, 4, 5, 8]] = 0
+    planned = plan(studio, frames, missing="hold")
+    assert [frame.held for frame in planned.frames] == [2, 2, None, None, 3, 3, None, None, 7]
+    assert planned.frames[4].person == planned.frames[3].person
+    assert planned.missing == [(0, 2), (4, 6), (8, 9)]
+
+
+def test_background_may_begin_a_driver(studio) -> None:
+    frames = studio.walk(5)
+    frames[:2] = 0
+    planned = plan(studio, frames, missing="background")
+    assert [frame.person is None for frame in planned.frames] == [True, True, False, False, False]
+
+
+def test_missing_fail_names_every_stretch_with_its_times(studio) -> None:
+    frames = studio.walk(60)
+    frames[[10, 11, 50]] = 0
+    with pytest.raises(InputError, match=r"0:00.32-0:00.40 \(frames 10:12\), 0:01.92-0:01.96 \("):
+        plan(studio, frames, missing="fail", frames=(2, None))
+    assert plan(studio, frames[:10], missing="fail").missing == []
+
+
+def test_long_lists_are_cut() -> None:
+    text = list_stretches([(2 * i, 2 * i + 1) for i in range(13)], 0, Fraction(1, 60))
+    assert text.startswith("0:00.00-1:00.00 (frames 0:1), 2:00.00-3:00.00")
+    assert text.endswith("(frames 18:19) and 3 more")

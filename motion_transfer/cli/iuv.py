@@ -1,0 +1,165 @@
+"""`mt iuv`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from motion_transfer.cli.progress import CountBar
+from motion_transfer.cli.sections import SectionCommand, SectionOption
+
+FILE = click.Path(path_type=Path)
+
+
+def section(heading: str) -> Any:
+    """An option decorator whose options stand under one heading."""
+    return partial(click.option, cls=SectionOption, section=heading)
+
+
+input_option = section("Input")
+repair_option = section("Repair")
+output_option = section("Output")
+
+INPUT_OPTIONS = (
+    input_option(
+        "--iuv-order", metavar="ORDER", help="Channels of the file's RGB, iuv or vui; else found."
+    ),
+    input_option(
+        "--missing",
+        default="fail",
+        metavar="fail|hold|background",
+        help="Numbers missing in a folder: stop (default), repeat the frame before, or nobody.",
+    ),
+)
+OUTPUT_OPTIONS = (
+    output_option(
+        "-o",
+        "--output",
+        type=FILE,
+        required=True,
+        help="A folder for PNG, .mkv (FFV1, lossless), .npy, or .png for one frame.",
+    ),
+    output_option(
+        "--order",
+        "output_order",
+        default="vui",
+        metavar="ORDER",
+        help="Channels to write: vui (default, as Caffe2's DensePose) or iuv; arrays are I, U, V.",
+    ),
+    output_option("--fps", metavar="RATE", help="Of an .mkv; default: the input's, or 30."),
+    output_option("--force", is_flag=True, help="Replace an existing output."),
+    output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
+)
+
+
+def with_options(*groups: tuple[Any, ...]) -> Any:
+    """A decorator that adds options, in order."""
+
+    def add(function: Any) -> Any:
+        for option in reversed([option for group in groups for option in group]):
+            function = option(function)
+        return function
+
+    return add
+
+
+class IuvGroup(click.Group):
+    """A group that, once it has a command `estimate`, needs not be told so: `mt iuv me.jpg`."""
+
+    default = "estimate"
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        names = (*self.commands, *self.get_help_option_names(ctx))
+        if args and self.default in self.commands and args[0] not in names:
+            args = [self.default, *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group(cls=IuvGroup)
+def iuv() -> None:
+    """Convert IUV between formats, and repair it.
+
+    \b
+    mt iuv convert results.pkl -o dance_iuv/
+    mt iuv repair dance_iuv/ -o steady.mkv --fill-gaps interpolate --speckle 20 --smooth
+    """
+
+
+@iuv.command(cls=SectionCommand)
+@click.argument("source", metavar="IN", type=FILE)
+@with_options(INPUT_OPTIONS, OUTPUT_OPTIONS)
+def convert(source: Path, output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
+    """Rewrite IUV in another form, without loss.
+
+    IN is a folder of IUV images or arrays, one IUV image, a lossless video, a .npy or .npz stack,
+    quantised results (3 x H x W), global UV (floats, H x W x 2, NaN background), or a detectron2
+    dump (apply_net.py dump; nothing in it is executed).
+
+    \b
+    mt iuv convert results.pkl -o dance_iuv/
+    mt iuv convert dance_iuv/ -o dance.mkv --fps 25
+    mt iuv convert caffe2_iuv/ -o rgb_iuv/ --order iuv
+    """
+    from motion_transfer.media.iuv_convert import ConvertOptions, convert_iuv
+    from motion_transfer.render.options import parse_rate
+
+    settings = ConvertOptions(
+        source=source, output=output, frame_rate=parse_rate(fps) if fps else None, **options
+    )
+    with CountBar("converting", unit="frame", quiet=quiet) as bar:
+        written, notes = convert_iuv(settings, bar.advance)
+    if not quiet:
+        _say_notes(notes)
+        click.echo(f"wrote {output}: {written.frame_count} frames")
+
+
+@iuv.command(cls=SectionCommand)
+@click.argument("source", metavar="IN", type=FILE)
+@repair_option(
+    "--fill-gaps",
+    metavar="hold|interpolate",
+    help="Fill frames without anybody: repeat the frame before, or move its parts on.",
+)
+@repair_option(
+    "--speckle",
+    type=int,
+    default=0,
+    metavar="N",
+    help="Remove regions of one part, and holes, of fewer than N pixels.",
+)
+@repair_option("--smooth", is_flag=True, help="Steady part borders, and U and V within parts.")
+@with_options(INPUT_OPTIONS, OUTPUT_OPTIONS)
+def repair(source: Path, output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
+    """Fill gaps, remove speckles, and steady a driver; any length.
+
+    Flicker is reported before and after: the share of the body's pixels whose part comes and goes
+    within one frame, and how far U and V are from the mean of their neighbours in time.
+
+    \b
+    mt iuv repair dance_iuv/ -o steady.mkv --fill-gaps interpolate --speckle 20 --smooth
+    """
+    from motion_transfer.render.options import parse_rate
+    from motion_transfer.repair.run import RepairOptions, repair_iuv
+
+    settings = RepairOptions(
+        source=source, output=output, frame_rate=parse_rate(fps) if fps else None, **options
+    )
+    with CountBar("repairing", unit="frame", quiet=quiet) as bar:
+        report = repair_iuv(settings, bar.advance)
+    if not quiet:
+        _say_notes(report.notes)
+        old, new = report.before, report.after
+        click.echo(
+            f"wrote {output}: {new.frame_count} frames; empty frames {old.empty_frames} ->"
+            f" {new.empty_frames}, part flicker {old.parts:.2%} -> {new.parts:.2%}, UV flicker"
+            f" {old.uv:.2f} -> {new.uv:.2f} of 255"
+        )
+
+
+def _say_notes(notes: Iterable[str]) -> None:
+    for note in notes:
+        click.echo(f"mt: note: {note}", err=True)

@@ -1,0 +1,1 @@
+"""Repairing IUV sequences: frames without people, speckles, trembling borders; all streaming."""
