@@ -1,0 +1,29 @@
+"""From raw pictures to people: where they are, their landmarks, alpha and IUV.
+
+Public names are loaded when they are first used: asking where the models lie needs no network.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from motion_transfer.estimate.blazepose import BlazePoseEstimator
+    from motion_transfer.estimate.interface import Box, Estimator, Landmarks, PersonEstimate
+
+_HOMES = {
+    "BlazePoseEstimator": "blazepose",
+    "Box": "interface",
+    "Estimator": "interface",
+    "Landmarks": "interface",
+    "PersonEstimate": "interface",
+}
+
+__all__ = ["BlazePoseEstimator", "Box", "Estimator", "Landmarks", "PersonEstimate"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
