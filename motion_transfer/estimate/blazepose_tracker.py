@@ -24,6 +24,9 @@ NEWCOMERS_EVERY = 12
 SAME_PLACE = 0.25
 """Regions whose middles are closer than this share of their side show one person."""
 
+LEAST_NEWCOMER = 0.75
+"""Presence from which somebody is followed; ghosts have less."""
+
 TILE_OVERLAP = 0.5
 MOST_TILES = 8
 LEAST_TILE_SCORE = 0.65
@@ -113,6 +116,8 @@ class BodyTracker:
         """Add the body at a track's place, unless it is nobody, or somebody seen already."""
         body = self._landmarker.look(frame, track.region)
         if body is None or not body.next_region.is_usable:
+            return
+        if track.number < 0 and body.presence < LEAST_NEWCOMER:
             return
         if any(same_place(body.next_region, other.next_region) for _, other in seen):
             return
