@@ -15,7 +15,6 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 from torch import Tensor
-from torch.nn import functional as F
 
 from motion_transfer.estimate.interface import LANDMARK, LANDMARK_COUNT, Box, Landmarks
 
@@ -152,7 +151,9 @@ def feature_maps(body: BodyInput) -> Float[Tensor, "B C 64 64"]:
     batch = bones.shape[0]
     places = (grid.T * 2 - 1).expand(batch, 2, -1)
     drawn = torch.cat([bones, places], 1).reshape(batch, -1, GRID, GRID)
-    return torch.cat([drawn, F.pixel_unshuffle(body.mask, MASK_SIZE // GRID)], 1)
+    finer = MASK_SIZE // GRID
+    cells = body.mask.view(batch, GRID, finer, GRID, finer).permute(0, 2, 4, 1, 3)
+    return torch.cat([drawn, cells.reshape(batch, finer**2, GRID, GRID)], 1)
 
 
 def _ends(points: Float[Tensor, "B 33 3"]) -> Float[Tensor, "B bones 2 3"]:

@@ -41,7 +41,7 @@ class IuvNetworkConfig:
         code: numbers that the row of landmarks is condensed to.
     """
 
-    widths: tuple[int, ...] = (40, 72, 112, 160)
+    widths: tuple[int, ...] = (32, 56, 96, 144)
     code: int = 128
 
 
@@ -81,7 +81,7 @@ class IuvNetwork(nn.Module):
     def forward(self, body: BodyInput) -> IuvLogits:
         """The logits of B people."""
         code = self.encode_row(feature_vector(body))
-        features = self.stem(feature_maps(body)).contiguous(memory_format=torch.channels_last)
+        features = self.stem(feature_maps(body))
         skips: list[Tensor] = []
         for level, block in enumerate(self.down):
             features = block(F.max_pool2d(features, 2) if level else features, code)
@@ -90,7 +90,7 @@ class IuvNetwork(nn.Module):
         for block in self.up:
             larger = F.interpolate(features, scale_factor=2, mode="nearest")
             features = block(torch.cat([larger, skips.pop()], 1), code)
-        out = F.pixel_shuffle(self.head(features), FINER)
+        out = spread_cells(self.head(features))
         parts, uv = out.split((PARTS, 2 * (PARTS - 1)), dim=1)
         return IuvLogits(parts, uv.unflatten(1, (PARTS - 1, 2)) + 0.5)
 
@@ -100,7 +100,14 @@ class IuvNetwork(nn.Module):
         for block in self.modules():
             if isinstance(block, Block):
                 block.fuse()
-        return self.to(memory_format=torch.channels_last)
+        return self
+
+
+def spread_cells(cells: Float[Tensor, "B C h w"]) -> Float[Tensor, "B c H W"]:
+    """Four values of each cell as four pixels; `F.pixel_shuffle`, which is slow on a CPU."""
+    batch, channels, height, width = cells.shape
+    split = cells.view(batch, FINER, FINER, channels // FINER**2, height, width)
+    return split.permute(0, 3, 4, 1, 5, 2).reshape(batch, -1, FINER * height, FINER * width)
 
 
 class Block(nn.Module):

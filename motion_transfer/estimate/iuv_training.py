@@ -71,7 +71,7 @@ class IuvTraining:
         self.settings, self.run = settings, run
         self.files = list_samples(data)
         torch.manual_seed(settings.seed)
-        self.network = IuvNetwork(settings.network).to(memory_format=torch.channels_last)
+        self.network = IuvNetwork(settings.network)
         self.averaged = deepcopy(self.network).requires_grad_(False)
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay
