@@ -66,7 +66,9 @@ def main() -> None:
         print(f"{name:16}" + "".join(f"{getattr(scores[-1], n):16.3f}" for n in names))
         if options.pictures:
             options.pictures.mkdir(parents=True, exist_ok=True)
-            picture = np.hstack([photo[..., ::-1], coloured(true), coloured(iuv), faded(photo, person)])
+            picture = np.hstack(
+                [photo[..., ::-1], coloured(true), coloured(iuv), faded(photo, person)]
+            )
             cv2.imwrite(str(options.pictures / f"{name}.png"), picture)
     means = [np.mean([getattr(score, n) for score in scores]) for n in names]
     print(f"{'mean':16}" + "".join(f"{mean:16.3f}" for mean in means))

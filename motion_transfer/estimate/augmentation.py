@@ -176,9 +176,7 @@ def _view(window: Box, settings: Augmentation, rng: Rng) -> np.ndarray:
     return np.concatenate([matrix, (target - matrix @ middle)[:, None]], 1)
 
 
-def _warped(
-    image: np.ndarray, matrix: np.ndarray, side: int, size: int, way: int
-) -> np.ndarray:
+def _warped(image: np.ndarray, matrix: np.ndarray, side: int, size: int, way: int) -> np.ndarray:
     """An image in the window, at size x size."""
     scaled = matrix * (size / side)
     # OpenCV's whole numbers are pixel centres

@@ -83,13 +83,13 @@ class BlazePoseEstimator:
         seen = _mask_in(body, window, size, scale)
         with torch.inference_mode():
             logits = self._network(body_input(body.landmarks, seen, window))
-            iuv = paint_iuv(logits, window.width)
-        alpha = body.region.paste(body.mask, box.left, box.top, box.width, box.height)
+            iuv = paint_iuv(logits, window, box)
+        mask = np.rint(body.mask * 255).astype(np.uint8)
         return PersonEstimate(
             track=number,
             box=box,
-            iuv=_moved(iuv, window, box),
-            alpha=np.rint(alpha * 255).astype(np.uint8),
+            iuv=iuv,
+            alpha=body.region.paste(mask, box),
             confidence=body.presence,
             landmarks=body.landmarks,
         )
@@ -101,9 +101,7 @@ def mask_on_frame(body: SeenBody, height: int, width: int, level: float) -> Box 
     if not len(rows):
         return None
     size = body.mask.shape[0]
-    ends = np.array(
-        [[columns.min(), rows.min()], [columns.max() + 1, rows.max() + 1]], np.float32
-    )
+    ends = np.array([[columns.min(), rows.min()], [columns.max() + 1, rows.max() + 1]], np.float32)
     corners = np.array([[x, y] for x in ends[:, 0] for y in ends[:, 1]], np.float32)
     on_frame = body.region.to_frame(corners / size)
     low = np.floor(on_frame.min(0)).clip(0).astype(int)
@@ -126,15 +124,3 @@ def _mask_in(
         (size, size),
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
     )
-
-
-def _moved(iuv: UInt8[np.ndarray, "s s 3"], window: Box, box: Box) -> UInt8[np.ndarray, "h w 3"]:
-    """The part of a window's IUV that lies in a box; nobody where the window does not reach."""
-    out = np.zeros((box.height, box.width, 3), np.uint8)
-    left, right = max(box.left, window.left), min(box.right, window.right)
-    top, bottom = max(box.top, window.top), min(box.bottom, window.bottom)
-    if left < right and top < bottom:
-        out[top - box.top : bottom - box.top, left - box.left : right - box.left] = iuv[
-            top - window.top : bottom - window.top, left - window.left : right - window.left
-        ]
-    return out

@@ -41,9 +41,9 @@ class Detection:
     """
 
     score: float
-    box: Float32[np.ndarray, "4"]
-    hips: Float32[np.ndarray, "2"]
-    top: Float32[np.ndarray, "2"]
+    box: Float32[np.ndarray, 4]
+    hips: Float32[np.ndarray, 2]
+    top: Float32[np.ndarray, 2]
 
     @property
     def region(self) -> Region:

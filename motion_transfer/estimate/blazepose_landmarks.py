@@ -64,11 +64,11 @@ class LandmarkModel:
 
 
 def read_outputs(
-    points: Float32[np.ndarray, "195"],
+    points: Float32[np.ndarray, 195],
     presence: float,
     mask: Float32[np.ndarray, "256 256"],
     heat: Float32[np.ndarray, "64 64 39"],
-    world: Float32[np.ndarray, "117"],
+    world: Float32[np.ndarray, 117],
     region: Region,
 ) -> SeenBody:
     """The network's outputs on the frame. Of 39 points 33 are landmarks and two span the region of

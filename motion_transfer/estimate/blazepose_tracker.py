@@ -110,9 +110,7 @@ class BodyTracker:
             if not any(same_place(found.region, body.region) for _, body in seen):
                 self._look(frame, Track(-1, found.region), seen)
 
-    def _look(
-        self, frame: np.ndarray, track: Track, seen: list[tuple[Track, SeenBody]]
-    ) -> None:
+    def _look(self, frame: np.ndarray, track: Track, seen: list[tuple[Track, SeenBody]]) -> None:
         """Add the body at a track's place, unless it is nobody, or somebody seen already."""
         body = self._landmarker.look(frame, track.region)
         if body is None or not body.next_region.is_usable:
@@ -161,7 +159,7 @@ def tiles(height: int, width: int) -> list[Region]:
 
 
 def _middles(length: int, side: float) -> np.ndarray:
-    """Centres of overlapping stretches that cover a length; no more than `MOST_TILES`, as panoramas are
-    not searched inch by inch."""
+    """Centres of overlapping stretches that cover a length; no more than `MOST_TILES`, as
+    panoramas are not searched inch by inch."""
     count = 1 + int(np.ceil((length - side) / (side * (1 - TILE_OVERLAP)) - 1e-6))
     return np.linspace(side / 2, length - side / 2, max(1, min(count, MOST_TILES)))

@@ -77,9 +77,9 @@ def skin_places(model: BodyModel) -> dict[str, int]:
     body = model.template
     points = body.points
     x, y, z = points.T
-    on_head = np.asarray(
-        model.weights.matrix[:, [body.skeleton.index["head"]]].toarray()
-    )[:, 0] > 0.5
+    on_head = (
+        np.asarray(model.weights.matrix[:, [body.skeleton.index["head"]]].toarray())[:, 0] > 0.5
+    )
     places: dict[str, int] = {}
     for side, sign in (("L", 1), ("R", -1)):
         eye = body.joint(f"eye.{side}")
@@ -153,9 +153,7 @@ def exact_landmarks(posed: PosedBody, model: BodyModel, camera: Camera) -> Landm
     depth = (screen[:, 2] - distance) * camera.focal_px / distance
     inside = (screen[:, :2] >= 0).all(1) & (screen[:, :2] < (camera.width, camera.height)).all(1)
     nearest = depths(
-        rasterise(
-            camera.project(posed.points), Triangles(model.faces), camera.width, camera.height
-        )
+        rasterise(camera.project(posed.points), Triangles(model.faces), camera.width, camera.height)
     ).reshape(camera.height, camera.width)
     column, row = (screen[:, :2].clip(0, (camera.width - 1, camera.height - 1))).astype(int).T
     surface = np.nan_to_num(nearest[row, column], nan=np.inf)
@@ -165,5 +163,5 @@ def exact_landmarks(posed: PosedBody, model: BodyModel, camera: Camera) -> Landm
         image=np.concatenate([screen[:, :2], depth[:, None]], 1).astype(np.float32),
         world=((places - middle) @ camera.axes.T).astype(np.float32),
         visibility=seen.astype(np.float32),
-        presence=inside.astype(np.float32),
+        presence=np.asarray(inside, np.float32),
     )

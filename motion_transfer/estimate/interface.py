@@ -15,7 +15,11 @@ from jaxtyping import Float32, UInt8
 
 LANDMARK_NAMES = (
     "nose",
-    *(f"{side}-eye-{place}" for side in ("left", "right") for place in ("inner", "middle", "outer")),
+    *(
+        f"{side}-eye-{place}"
+        for side in ("left", "right")
+        for place in ("inner", "middle", "outer")
+    ),
     *("left-ear", "right-ear", "mouth-left", "mouth-right"),
     *(
         f"{side}-{joint}"

@@ -14,7 +14,7 @@ from motion_transfer.estimate.iuv_network import PARTS, IuvLogits
 
 UV_WEIGHT = 5.0
 SMALL_PARTS = 0.3
-"""Parts weigh their mean area to the power of minus this: hands and feet count, and yet pixels do."""
+"""Parts weigh their mean area to the power of minus this: hands and feet count too."""
 
 PART_AREAS = (
     *(0.72, 0.029, 0.033, 0.003, 0.003, 0.004, 0.004),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 from torch.nn import functional as F
 
+from motion_transfer.estimate.interface import Box
 from motion_transfer.estimate.iuv_network import IuvLogits
 
 FINEST = 768
@@ -16,24 +16,31 @@ FINEST = 768
 hold no finer borders."""
 
 
-def paint_iuv(logits: IuvLogits, side: int) -> UInt8[np.ndarray, "side side 3"]:
-    """IUV on a window of side x side px, from the logits of one person (B = 1).
+def paint_iuv(logits: IuvLogits, window: Box, box: Box) -> UInt8[np.ndarray, "h w 3"]:
+    """IUV on a box of the frame, from the logits of one person (B = 1) in a window.
 
     Parts are decided after enlarging their logits, so that borders are smooth; U and V are
-    interpolated within each part and never across a border.
+    interpolated within each part and never across a border. Nobody is where the box reaches beyond
+    the window.
     """
-    size = min(side, FINEST)
+    size = min(window.width, FINEST)
     enlarged = F.interpolate(logits.parts, (size, size), mode="bilinear", align_corners=False)
     parts = enlarged[0].argmax(0)
     rows, columns = torch.nonzero(parts, as_tuple=True)
     which = parts[rows, columns]
-    iuv = np.zeros((size, size, 3), np.uint8)
+    # a border of nobody around it, for pixels beyond the window
+    iuv = np.zeros((size + 2, size + 2, 3), np.uint8)
     uv = interpolate_within(logits.uv[0], which - 1, rows, columns, size)
     values = torch.cat([which[:, None], (uv.clamp(0, 1) * 255).round().long()], 1)
-    iuv[rows.numpy(), columns.numpy()] = values.to(torch.uint8).numpy()
-    if size == side:
-        return iuv
-    return cv2.resize(iuv, (side, side), interpolation=cv2.INTER_NEAREST)
+    iuv[rows.numpy() + 1, columns.numpy() + 1] = values.to(torch.uint8).numpy()
+    nearest = [
+        np.floor((np.arange(first, last) + 0.5 - start) * (size / window.width)).astype(int) + 1
+        for first, last, start in (
+            (box.top, box.bottom, window.top),
+            (box.left, box.right, window.left),
+        )
+    ]
+    return iuv[nearest[0].clip(0, size + 1)[:, None], nearest[1].clip(0, size + 1)]
 
 
 def interpolate_within(

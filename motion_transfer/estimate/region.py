@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
 
+from motion_transfer.estimate.interface import Box
+
 ENLARGED = 1.25
 """Both graphs of MediaPipe take a region a quarter larger than the circle that holds the body."""
 
@@ -68,8 +70,8 @@ class Region:
     def matrix(self, size: int) -> np.ndarray:
         """2 x 3: pixels of the region seen at `size` x `size` -> frame, as OpenCV counts them.
 
-        As in MediaPipe, on whose pictures the networks were made, the centre of the first pixel lies
-        on the region's corner: half a pixel of the region off.
+        As in MediaPipe, for which the networks were made, the centre of the first pixel lies on
+        the region's corner: half a pixel of the region off.
         """
         scale = self.side / size
         c, s = cos(self.turn) * scale, sin(self.turn) * scale
@@ -100,17 +102,14 @@ class Region:
             borderMode=border,
         )
 
-    def paste(
-        self, image: Float32[np.ndarray, "size size"], left: int, top: int, width: int, height: int
-    ) -> Float32[np.ndarray, "height width"]:
-        """What was seen in the region, on a box of the frame; 0 outside the region."""
-        matrix = self.matrix(image.shape[0])
-        matrix = cv2.invertAffineTransform(matrix)
-        matrix[:, 2] += matrix[:, :2] @ (left, top)
+    def paste(self, image: np.ndarray, box: Box) -> np.ndarray:
+        """What was seen in the region, a square image, on a box of the frame; 0 outside."""
+        matrix = cv2.invertAffineTransform(self.matrix(image.shape[0]))
+        matrix[:, 2] += matrix[:, :2] @ (box.left, box.top)
         return cv2.warpAffine(
             image,
             matrix,
-            (width, height),
+            (box.width, box.height),
             flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
             borderMode=cv2.BORDER_CONSTANT,
         )
@@ -123,8 +122,13 @@ def _shrunk(
     height, width = frame.shape[:2]
     corners = matrix @ np.array([[0, size, 0, size], [0, 0, size, size], [1, 1, 1, 1]])
     room = (width, height)
-    low = [int(np.clip(np.floor(c.min()) - factor, 0, s - 1)) for c, s in zip(corners, room, strict=True)]
-    high = [int(np.clip(np.ceil(c.max()) + factor, 1, s)) for c, s in zip(corners, room, strict=True)]
+    low = [
+        int(np.clip(np.floor(c.min()) - factor, 0, s - 1))
+        for c, s in zip(corners, room, strict=True)
+    ]
+    high = [
+        int(np.clip(np.ceil(c.max()) + factor, 1, s)) for c, s in zip(corners, room, strict=True)
+    ]
     high = [max(h, lo + 1) for h, lo in zip(high, low, strict=True)]
     part = frame[low[1] : high[1], low[0] : high[0]]
     small = [max(1, round(n / factor)) for n in part.shape[1::-1]]

@@ -22,7 +22,7 @@ from jaxtyping import Float32, UInt8
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.blazepose_tracker import BodyTracker
 from motion_transfer.estimate.body_landmarks import exact_landmarks
-from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
+from motion_transfer.estimate.interface import LANDMARK_COUNT, Box, Landmarks
 from motion_transfer.media.publish import explain_disk_errors, publish
 from motion_transfer.people.dataset import PeopleStream, Split
 from motion_transfer.people.figure.body import load_body_model
@@ -195,8 +195,8 @@ def look_at(
     tall = float(np.ptp(exact.image[:, 1]))
     if np.median(away[exact.presence > 0.5]) > WORST_ANSWER * tall:
         return None, np.zeros((height, width), np.uint8)
-    mask = body.region.paste(body.mask, 0, 0, width, height)
-    return body.landmarks, np.rint(mask * 255).astype(np.uint8)
+    mask = np.rint(body.mask * 255).astype(np.uint8)
+    return body.landmarks, body.region.paste(mask, Box(0, 0, width, height))
 
 
 def _packed(landmarks: Landmarks) -> Float32[np.ndarray, "33 8"]:
