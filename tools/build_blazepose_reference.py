@@ -6,7 +6,8 @@ Needs an environment of its own, since mediapipe wants other versions of what th
     mp/bin/python tools/build_blazepose_reference.py NAME=FILE[:LEFT,TOP,RIGHT,BOTTOM] ...
 
 Each picture is looked at on its own (`static_image_mode`); one whose name ends in `-clip` is also
-shown as a clip of frames that wander over it, so that tracking is written down too.
+shown as a clip of frames that wander over it, so that tracking is written down too, and its mask is
+kept, small: give such names to pictures in the public domain only.
 """
 
 from __future__ import annotations
@@ -42,12 +43,16 @@ def main(arguments: list[str]) -> None:
         entry = {"file": Path(path).name, "crop": [int(side) for side in crop.split(",") if side]}
         frames = [np.ascontiguousarray(picture)]
         entry["still"] = watch(frames, still=True)[0]
+        if entry["still"] and not name.endswith("-clip"):
+            del entry["still"]["mask"]
         if name.endswith("-clip"):
             frames = [np.ascontiguousarray(picture[y:, x:]) for x, y in CLIP_SHIFTS]
             size = min(f.shape[0] for f in frames), min(f.shape[1] for f in frames)
             frames = [np.ascontiguousarray(f[: size[0], : size[1]]) for f in frames]
             entry["shifts"] = CLIP_SHIFTS
             entry["clip"] = watch(frames, still=False)
+            for seen in entry["clip"]:
+                del seen["mask"]
         found[name] = entry
     text = json.dumps(found, separators=(",", ":")).replace('},"', '},\n"')
     OUTPUT.write_text(text + "\n")

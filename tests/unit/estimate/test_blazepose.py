@@ -58,15 +58,16 @@ def assert_same(body, told: dict, size: tuple[int, int]) -> None:
     assert body.landmarks.visibility == pytest.approx(np.array(told["visibility"]), abs=0.1)
     mask = body.region.paste(body.mask, Box(0, 0, size[1], size[0]))
     assert mask.sum() == pytest.approx(told["mask_area_px"], rel=0.01)
-    small = cv2.resize(mask, (32, 32), interpolation=cv2.INTER_AREA)
-    assert np.abs(small - np.array(told["mask"]) / 99).mean() < 0.01
+    if "mask" in told:
+        small = cv2.resize(mask, (32, 32), interpolation=cv2.INTER_AREA)
+        assert np.abs(small - np.array(told["mask"]) / 99).mean() < 0.01
 
 
 def test_a_photo_in_the_public_domain(models, mediapipe_results) -> None:
     check("astronaut-clip", mediapipe_results["astronaut-clip"], models, None)
 
 
-@pytest.mark.parametrize("name", ["blouse-clip", "dress", "man", "street"])
+@pytest.mark.parametrize("name", ["blouse", "dress", "man", "street"])
 def test_real_photos(models, mediapipe_results, samples: Path, name: str) -> None:
     check(name, mediapipe_results[name], models, samples)
 
