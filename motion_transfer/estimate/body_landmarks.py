@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from motion_transfer.estimate.interface import LANDMARK_COUNT, LANDMARK_NAMES, Landmarks
+from motion_transfer.estimate.interface import LANDMARK_NAMES, Landmarks
 from motion_transfer.people.figure.body import Body, BodyModel
 from motion_transfer.people.figure.camera import Camera
 from motion_transfer.people.figure.mesh import PosedBody
@@ -158,7 +158,6 @@ def exact_landmarks(posed: PosedBody, model: BodyModel, camera: Camera) -> Landm
     column, row = (screen[:, :2].clip(0, (camera.width - 1, camera.height - 1))).astype(int).T
     surface = np.nan_to_num(nearest[row, column], nan=np.inf)
     seen = inside & (screen[:, 2] < surface + COVERED_BEHIND_METRES)
-    assert len(places) == LANDMARK_COUNT
     return Landmarks(
         image=np.concatenate([screen[:, :2], depth[:, None]], 1).astype(np.float32),
         world=((places - middle) @ camera.axes.T).astype(np.float32),

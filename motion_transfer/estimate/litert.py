@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -41,14 +43,14 @@ class LiteModel:
         return [self._interpreter.get_tensor(output["index"])[0] for output in self._outputs]
 
 
-class _quiet:  # noqa: N801  used as a function
+@contextmanager
+def _quiet() -> Iterator[None]:
     """Keep the run-time's remark about its kernels, which native code writes, off stderr."""
-
-    def __enter__(self) -> None:
-        self._stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
         os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
         os.close(nowhere)
-
-    def __exit__(self, *_: object) -> None:
-        os.dup2(self._stderr, 2)
-        os.close(self._stderr)

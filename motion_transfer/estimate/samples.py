@@ -10,7 +10,7 @@ import json
 import multiprocessing
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -232,9 +232,3 @@ def _claim(options: SampleOptions) -> None:
     temporary = options.out / f".{SETTINGS_FILE}.tmp"
     temporary.write_text(wanted)
     publish(temporary, file)
-
-
-def ordered(files: Sequence[Path], seed: int) -> list[Path]:
-    """The files in a random order that the seed decides."""
-    order = np.random.default_rng(seed).permutation(len(files))
-    return [files[index] for index in order]
