@@ -49,6 +49,7 @@ class TrainingSettings:
 
     Attributes:
         steps: in all; the learning rate falls to nothing at the last one.
+        warm_up_steps: in which the learning rate rises to its full height.
         keep: of the averaged weights at each step.
         save_every: steps between two states on disk.
     """
@@ -56,6 +57,7 @@ class TrainingSettings:
     steps: int = 20000
     batch_size: int = 16
     learning_rate: float = 2e-3
+    warm_up_steps: int = 200
     weight_decay: float = 1e-4
     keep: float = 0.999
     save_every: int = 250
@@ -117,7 +119,7 @@ class IuvTraining:
     def _learn(self, batch: Batch) -> dict[str, float]:
         settings = self.settings
         share = self.step / settings.steps
-        warm = min(1.0, (self.step + 1) / 200)
+        warm = min(1.0, (self.step + 1) / settings.warm_up_steps)
         rate = settings.learning_rate * warm * 0.5 * (1 + math.cos(math.pi * share))
         for group in self.optimiser.param_groups:
             group["lr"] = rate
