@@ -44,3 +44,7 @@ class RenderError(MotionTransferError):
 
 class TrainingError(MotionTransferError):
     """Training failed after its input had been accepted."""
+
+
+class FetchError(MotionTransferError):
+    """Something that has to be downloaded cannot be had."""

@@ -18,6 +18,7 @@ COMMANDS = {
     "demo": "Render a photo and a driver that ship with the program.",
     "train": "Train the network, or fine-tune it on one person.",
     "people": "Synthetic people: photos with exact IUV, and drivers from motion.",
+    "models": "The networks that find people in raw pictures: fetch them.",
     "eval": "Score renderers, and other methods' pictures, on the same pairs.",
     "iuv": "Convert IUV between formats, and repair it.",
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",

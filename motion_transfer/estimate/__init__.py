@@ -10,17 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from motion_transfer.estimate.blazepose import BlazePoseEstimator
+    from motion_transfer.estimate.densepose import DensePoseEstimator
     from motion_transfer.estimate.interface import Box, Estimator, Landmarks, PersonEstimate
 
 _HOMES = {
     "BlazePoseEstimator": "blazepose",
     "Box": "interface",
+    "DensePoseEstimator": "densepose",
     "Estimator": "interface",
     "Landmarks": "interface",
     "PersonEstimate": "interface",
 }
 
-__all__ = ["BlazePoseEstimator", "Box", "Estimator", "Landmarks", "PersonEstimate"]
+__all__ = [
+    "BlazePoseEstimator",
+    "Box",
+    "DensePoseEstimator",
+    "Estimator",
+    "Landmarks",
+    "PersonEstimate",
+]
 
 
 def __getattr__(name: str) -> Any:

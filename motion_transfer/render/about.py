@@ -15,6 +15,9 @@ import torch
 from torch.utils.flop_counter import FlopCounterMode
 
 from motion_transfer.errors import InputError
+from motion_transfer.estimate.extra import ESTIMATE_EXTRA
+from motion_transfer.estimate.extra import missing_packages as missing_for_pictures
+from motion_transfer.estimate.model_files import MODEL_FILES, is_there, models_folder
 from motion_transfer.media.image import read_photo
 from motion_transfer.media.iuv_image import CHANNEL_ORDERS, IUV_SUFFIXES
 from motion_transfer.media.iuv_stream import IuvReader, open_reader, open_stream
@@ -60,10 +63,21 @@ def describe_setup() -> Facts:
             "texture": "ready (default; a draft, no weights)",
             "nhrr": "with --weights FILE",
         },
+        "raw pictures": _describe_estimators(),
         "people": f"pip install '{PEOPLE_EXTRA}'" if missing_packages() else "installed",
         "weights": "none ship yet",
         "presets": {name: describe_preset(config) for name, config in PRESETS.items()},
     }
+
+
+def _describe_estimators() -> str:
+    if missing_for_pictures():
+        return f"pip install '{ESTIMATE_EXTRA}'"
+    absent = [file.name for file in MODEL_FILES if not is_there(file)]
+    folder = models_folder()
+    return (
+        f"{' and '.join(absent)} not in {folder}: mt models fetch" if absent else f"ready, {folder}"
+    )
 
 
 def describe_preset(config: ModelConfig) -> Facts:

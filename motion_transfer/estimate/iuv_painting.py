@@ -1,0 +1,64 @@
+"""From the network's logits to an IUV image at the frame's own resolution."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int, UInt8
+from torch import Tensor
+from torch.nn import functional as F
+
+from motion_transfer.estimate.interface import Box
+from motion_transfer.estimate.iuv_network import IuvLogits
+
+FINEST = 768
+"""Larger windows are painted at this size and enlarged: memory stays bounded, and 128 x 128 logits
+hold no finer borders."""
+
+
+def paint_iuv(logits: IuvLogits, window: Box, box: Box) -> UInt8[np.ndarray, "h w 3"]:
+    """IUV on a box of the frame, from the logits of one person (B = 1) in a window.
+
+    Parts are decided after enlarging their logits, so that borders are smooth; U and V are
+    interpolated within each part and never across a border. Nobody is where the box reaches beyond
+    the window.
+    """
+    size = min(window.width, FINEST)
+    enlarged = F.interpolate(logits.parts, (size, size), mode="bilinear", align_corners=False)
+    parts = enlarged[0].argmax(0)
+    rows, columns = torch.nonzero(parts, as_tuple=True)
+    which = parts[rows, columns]
+    # a border of nobody around it, for pixels beyond the window
+    iuv = np.zeros((size + 2, size + 2, 3), np.uint8)
+    uv = interpolate_within(logits.uv[0], which - 1, rows, columns, size)
+    values = torch.cat([which[:, None], (uv.clamp(0, 1) * 255).round().long()], 1)
+    iuv[rows.numpy() + 1, columns.numpy() + 1] = values.to(torch.uint8).numpy()
+    nearest = [
+        np.floor((np.arange(first, last) + 0.5 - start) * (size / window.width)).astype(int) + 1
+        for first, last, start in (
+            (box.top, box.bottom, window.top),
+            (box.left, box.right, window.left),
+        )
+    ]
+    return iuv[nearest[0].clip(0, size + 1)[:, None], nearest[1].clip(0, size + 1)]
+
+
+def interpolate_within(
+    uv: Float[Tensor, "24 2 h w"],
+    chart: Int[Tensor, " N"],
+    rows: Int[Tensor, " N"],
+    columns: Int[Tensor, " N"],
+    size: int,
+) -> Float[Tensor, "N 2"]:
+    """U and V of one chart each at pixels of a size x size picture, bilinear between the low
+    resolution's pixel centres, clamped at the edge."""
+    height, width = uv.shape[-2:]
+    y = ((rows + 0.5) * (height / size) - 0.5).clamp(0, height - 1)
+    x = ((columns + 0.5) * (width / size) - 0.5).clamp(0, width - 1)
+    top, left = y.long().clamp_max(height - 2), x.long().clamp_max(width - 2)
+    down, right = (y - top)[:, None], (x - left)[:, None]
+    table = uv.permute(0, 2, 3, 1).reshape(-1, 2)
+    first = (chart * height + top) * width + left
+    above = torch.lerp(table[first], table[first + 1], right)
+    below = torch.lerp(table[first + width], table[first + width + 1], right)
+    return torch.lerp(above, below, down)
