@@ -166,7 +166,7 @@ class KeepingSettings:
         log_every: a line, and scalars for TensorBoard.
     """
 
-    checkpoint_every: int = 500
+    checkpoint_every: int = 250
     keep_last: int = 2
     keep_every: int = 10_000
     sample_every: int = 250
