@@ -116,9 +116,9 @@ class TextureCandidate(RenderedCandidate):
         return {"label": self.label, "kind": "renderer", "renderer": "texture"}
 
     def open_renderer(self, source: Source) -> Renderer:
-        from motion_transfer.render.texture_renderer import TextureRenderer
+        from motion_transfer.render.texture_renderer import TextureRenderer, tabulate_texture
 
-        return TextureRenderer(source)
+        return TextureRenderer(tabulate_texture(source))
 
 
 class WeightsCandidate(RenderedCandidate):
@@ -129,6 +129,7 @@ class WeightsCandidate(RenderedCandidate):
         from motion_transfer.weights import load_checkpoint
 
         self._model = load_checkpoint(path)
+        self._network: PreparedNetwork | None = None
         self._path = path
         self._choose_dtype = choose_dtype
         super().__init__(
@@ -151,9 +152,11 @@ class WeightsCandidate(RenderedCandidate):
         }
 
     def open_renderer(self, source: Source) -> Renderer:
-        from motion_transfer.render.neural_renderer import NeuralRenderer
+        from motion_transfer.render.neural_renderer import NeuralRenderer, PreparedNetwork
 
-        return NeuralRenderer(self._model, source, compile=False)
+        if self._network is None:
+            self._network = PreparedNetwork(self._model, compile=False)
+        return NeuralRenderer(self._network, self._network.encode(source))
 
 
 class FolderCandidate:

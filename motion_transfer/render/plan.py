@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
+from hashlib import sha256
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_stream import IuvReader
@@ -29,10 +30,22 @@ class Chunk:
 
 @dataclass(frozen=True)
 class FramePlan:
-    """Who is rendered in one frame: nobody (None), or a person, alone in it or to be isolated."""
+    """Who is rendered in one frame: nobody (None), or a person, alone in it or to be isolated.
+
+    `digest` is of the frame's IUV, everybody in it included; hexadecimal.
+    """
 
     person: Person | None
     alone: bool
+    digest: str = ""
+
+
+@dataclass(frozen=True)
+class SeenFrame:
+    """What one look at a driver's frame tells: who is in it, and a digest of its IUV."""
+
+    people: People
+    digest: str
 
 
 @dataclass(frozen=True)
@@ -71,55 +84,63 @@ def frame_range(frames: tuple[int | None, int | None], count: int, where: str) -
 
 def scan_people(
     reader: IuvReader, frames: range, workers: int, done: Callable[[int], None]
-) -> list[People]:
-    """Everybody in each frame, decoded in parallel; nothing but boxes is kept."""
+) -> list[SeenFrame]:
+    """Everybody in each frame, decoded in parallel; nothing but boxes and digests is kept."""
 
-    def scan(start: int) -> list[People]:
+    def scan(start: int) -> list[SeenFrame]:
         block = range(start, min(start + SCAN_FRAMES, frames.stop))
-        found = [find_people(iuv) for iuv in reader.read(block.start, block.stop)]
+        found = [
+            SeenFrame(find_people(iuv), sha256(iuv).hexdigest())
+            for iuv in reader.read(block.start, block.stop)
+        ]
         done(len(found))
         return found
 
     starts = range(frames.start, frames.stop, SCAN_FRAMES)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            return [people for block in pool.map(scan, starts) for people in block]
+            return [seen for block in pool.map(scan, starts) for seen in block]
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
 
 
-def plan_driver(
-    reader: IuvReader,
+def plan_path(
+    seen: list[SeenFrame],
     *,
-    frames: tuple[int | None, int | None],
+    chosen: range,
     frame_rate: Fraction,
     person: str,
-    workers: int,
-    done: Callable[[int], None],
+    where: str,
+    where_first: str,
 ) -> DriverPlan:
     """Follow the chosen person through the driver and lay the window around the whole path.
 
-    Raises: InputError if the first frame, or every frame, is empty; IuvFileError on a bad frame.
+    Args:
+        chosen: the driver's frames that were seen.
+        where, where_first: the driver and the first of those frames, for messages.
+    Raises: InputError if the first frame, or every frame, is empty.
     """
-    path_name = str(reader.stream.path)
-    chosen = frame_range(frames, reader.stream.frame_count, path_name)
-    people = scan_people(reader, chosen, workers, done)
+    people = [frame.people for frame in seen]
     inhabited = next((i for i, found in enumerate(people) if found.persons), None)
     if inhabited is None:
         raise InputError(
-            f"{path_name}: no person in any of the frames {chosen.start}:{chosen.stop}"
+            f"{where}: no person in any of the frames {chosen.start}:{chosen.stop}"
         )
     if inhabited > 0:
         raise InputError(
-            f"{reader.stream.where(chosen.start)}: no person in the first frame; start with"
+            f"{where_first}: no person in the first frame; start with"
             f" --frames {chosen.start + inhabited}:{chosen.stop}"
         )
-    first = choose_person(people[0], person, reader.stream.where(chosen.start))
+    first = choose_person(people[0], person, where_first)
     path = follow(people, first)
     plans = tuple(
-        FramePlan(who, alone=who is not None and len(who.regions) == found.region_count)
-        for who, found in zip(path, people, strict=True)
+        FramePlan(
+            who,
+            alone=who is not None and len(who.regions) == frame.people.region_count,
+            digest=frame.digest,
+        )
+        for who, frame in zip(path, seen, strict=True)
     )
     return DriverPlan(chosen.start, plans, plan_window(path), frame_rate)
 

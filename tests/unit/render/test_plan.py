@@ -15,15 +15,26 @@ from motion_transfer.render.plan import (
     FramePlan,
     empty_stretches,
     frame_range,
-    plan_driver,
+    plan_path,
+    scan_people,
 )
 from motion_transfer.render.window import Window
 
 
 def plan(studio, iuvs: np.ndarray, **changes) -> DriverPlan:
     settings = {"frames": (None, None), "person": "largest", "workers": 2, "done": lambda _: None}
+    settings |= changes
     reader = open_reader(open_stream(studio.array(iuvs)))
-    return plan_driver(reader, frame_rate=Fraction(25), **{**settings, **changes})
+    name = str(reader.stream.path)
+    chosen = frame_range(settings["frames"], reader.stream.frame_count, name)
+    return plan_path(
+        scan_people(reader, chosen, settings["workers"], settings["done"]),
+        chosen=chosen,
+        frame_rate=Fraction(25),
+        person=settings["person"],
+        where=name,
+        where_first=reader.stream.where(chosen.start),
+    )
 
 
 @pytest.mark.parametrize(
