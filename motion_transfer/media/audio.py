@@ -21,7 +21,6 @@ NO_AUDIO = "none"
 AUDIO_CODECS = {".mp4": "aac", ".mov": "aac", ".mkv": "aac", ".webm": "libopus"}
 BIT_RATE = 192_000
 RATES = (48_000, 44_100)  # Hz; what every encoder here takes. Other rates become the first
-MOST_CHANNELS = 2
 FRAME_SAMPLES = 960  # for encoders that take any number; Opus' 20 ms
 
 
@@ -85,7 +84,7 @@ class AudioTrack:
             with av.open(str(cut.path)) as container:
                 source = container.streams.audio[0]
                 rate = source.rate if source.rate in RATES else RATES[0]
-                layout = source.layout if source.channels <= MOST_CHANNELS else "stereo"
+                layout = "mono" if source.channels == 1 else "stereo"
         except (FFmpegError, IndexError) as error:
             raise InputError(f"audio {cut.path} cannot be read: {error}") from error
         stream = output.add_stream(AUDIO_CODECS[suffix], rate=rate)
@@ -93,6 +92,7 @@ class AudioTrack:
         self._stream.bit_rate = BIT_RATE
         self._stream.layout = layout
         self._stream.codec_context.thread_count = 1
+        self._stream.codec_context.open()  # settles how many samples a frame has
         self._packets = self._encode(cut)
         self._next: av.Packet | None = None
 
