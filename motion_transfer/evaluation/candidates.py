@@ -125,11 +125,11 @@ class WeightsCandidate(RenderedCandidate):
     """The network with one checkpoint. Raises: WeightsError."""
 
     def __init__(self, path: Path, background: str) -> None:
-        from motion_transfer.render.neural_renderer import choose_dtype
+        from motion_transfer.render.neural_renderer import PreparedNetwork, choose_dtype
         from motion_transfer.weights import load_checkpoint
 
         self._model = load_checkpoint(path)
-        self._network: PreparedNetwork | None = None
+        self._network = PreparedNetwork(self._model, compile=False)
         self._path = path
         self._choose_dtype = choose_dtype
         super().__init__(
@@ -152,11 +152,9 @@ class WeightsCandidate(RenderedCandidate):
         }
 
     def open_renderer(self, source: Source) -> Renderer:
-        from motion_transfer.render.neural_renderer import NeuralRenderer, PreparedNetwork
+        from motion_transfer.render.neural_renderer import NeuralRenderer, encode_source
 
-        if self._network is None:
-            self._network = PreparedNetwork(self._model, compile=False)
-        return NeuralRenderer(self._network, self._network.encode(source))
+        return NeuralRenderer(self._network, encode_source(self._model, source))
 
 
 class FolderCandidate:

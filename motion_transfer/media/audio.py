@@ -17,7 +17,6 @@ from av.error import FFmpegError
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.formats import OutputFormat
 
-NO_AUDIO = "none"
 AUDIO_CODECS = {".mp4": "aac", ".mov": "aac", ".mkv": "aac", ".webm": "libopus"}
 BIT_RATE = 192_000
 RATES = (48_000, 44_100)  # Hz; what every encoder here takes. Other rates become the first
@@ -49,7 +48,7 @@ def choose_audio(
         start_seconds: where the output begins in the driver.
     Raises: InputError for a file that has no sound; OutputError where the output can hold none.
     """
-    if wish is not None and str(wish) == NO_AUDIO:
+    if str(wish) == "none":
         return None
     if output_format.kind != "video":
         if wish is not None:

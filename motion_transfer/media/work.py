@@ -16,7 +16,7 @@ import shutil
 import socket
 import threading
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -37,8 +37,12 @@ def work_path(final: Path) -> Path:
 
 
 @contextmanager
-def locked(folder: Path, final: Path) -> Iterator[None]:
-    """Hold an existing folder's lock. Raises: OutputError naming who holds it already."""
+def locked(folder: Path, what: str) -> Iterator[None]:
+    """Hold an existing folder's lock. Raises: OutputError naming who holds it already.
+
+    Args:
+        what: begins the message, such as `cannot write out.mp4`.
+    """
     owner = folder / "owner.json"
     lock = FileLock(folder / "lock", timeout=0)
     try:
@@ -49,9 +53,7 @@ def locked(folder: Path, final: Path) -> Iterator[None]:
             words = f"process {who['process']} on {who['host']}"
         except (OSError, ValueError, KeyError, TypeError):
             words = "another process"
-        raise OutputError(
-            f"cannot write {final}: {words} is at work on it; wait for it, or stop it"
-        ) from None
+        raise OutputError(f"{what}: {words} is at work on it; wait for it, or stop it") from None
     try:
         owner.write_text(json.dumps({"process": os.getpid(), "host": socket.gethostname()}))
         yield
@@ -83,7 +85,7 @@ class WorkFolder:
                     break
                 self._made.append(folder)
             self.path.mkdir(parents=True, exist_ok=True)
-            self._lock = locked(self.path, self._final)
+            self._lock = locked(self.path, f"cannot write {self._final}")
             self._lock.__enter__()
             if self._restart:
                 self._remove_content()
@@ -175,10 +177,15 @@ def publish_piece(written: Path, final: Path) -> str:
     return digest
 
 
+def key_of(facts: Mapping[str, Any]) -> str:
+    """A digest of facts that JSON can hold; paths and fractions as words."""
+    return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()
+
+
 def digest_of(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files and their names; hexadecimal. Raises: OSError."""
     digest = hashlib.sha256()
-    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
     for file in files:
         if path.is_dir():
             digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import platform
-from collections.abc import Mapping
 from dataclasses import asdict
-from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.formats import OutputFormat
-from motion_transfer.media.work import digest_of
+from motion_transfer.media.work import digest_of, key_of
+from motion_transfer.render.beside import find_iuv_beside
 from motion_transfer.render.option import list_options
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.plan import Chunk, DriverPlan
 from motion_transfer.render.recipe import Recipe
-from motion_transfer.render.source import find_iuv_beside
 from motion_transfer.version import __version__
 
 LIBRARIES = ("torch", "numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy")
@@ -29,11 +25,6 @@ SAID_OTHERWISE = {
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio"),  # made when everything is drawn
 }
-
-
-def key_of(facts: Mapping[str, Any]) -> str:
-    """A digest of facts that JSON can hold; paths and fractions as words."""
-    return sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def digest_file(path: Path, what: str) -> str:
@@ -60,7 +51,7 @@ def source_key(options: RenderOptions, recipe: Recipe) -> str:
             "parts": [garment.parts for garment in options.garments],
             "person": options.person,
             "order": options.source_iuv_order,
-            "renderer": [recipe.name, recipe.weights_digest, recipe.compile],
+            "renderer": [recipe.name, recipe.weights_digest],
         }
     )
 

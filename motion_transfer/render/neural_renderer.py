@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 
 import cv2
 import numpy as np
@@ -38,22 +39,6 @@ class PreparedNetwork:
             shape = (1, self.config.map_channels, map_side, map_side)
             self.draw(torch.zeros(shape, device=self.device), blank)
 
-    def encode(self, source: Source) -> Tensor:
-        """The feature map, 1 x D x T x T, on the CPU.
-
-        Measured: FeatureNet's last bits depend on the number of threads, so it gets one, wherever
-        it runs; RenderNet's do not.
-        """
-        threads = torch.get_num_threads()
-        torch.set_num_threads(1)
-        try:
-            with torch.inference_mode():
-                return self._model.encode_texture(
-                    source.texture.to(self.device), source.visibility.to(self.device)
-                ).cpu()
-        finally:
-            torch.set_num_threads(threads)
-
     def draw(self, feature_map: Tensor, target: Tensor) -> Tensor:
         """RenderNet's frames, B x 3 or 4 x S x S uint8, of B x 3 x S x S target IUV."""
         with torch.inference_mode():
@@ -66,7 +51,11 @@ class PreparedNetwork:
             fast = FastRenderNet(net, dtype=self.dtype)
             if self.config.image_size % fast.multiple == 0:
                 return fast
-        plain = net.to(device=self.device, dtype=self.dtype).to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        plain = (
+            deepcopy(net)
+            .to(device=self.device, dtype=self.dtype)
+            .to(memory_format=torch.channels_last)
+        )  # pyright: ignore[reportCallIssue]
         run = torch.compile(plain) if compile else plain
         return lambda features: run(
             features.to(self.dtype, memory_format=torch.channels_last)
@@ -99,6 +88,24 @@ class NeuralRenderer:
             return images
         masks = np.stack([grow_mask(crop) for crop in iuv])
         return np.concatenate([images, masks[..., None]], axis=-1)
+
+
+def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
+    """A source's feature map, 1 x D x T x T, computed where the model lies, returned on the CPU.
+
+    Measured: FeatureNet's last bits depend on the number of threads, so it gets one, wherever it
+    runs; RenderNet's do not.
+    """
+    device = next(model.parameters()).device
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with torch.inference_mode():
+            return model.encode_texture(
+                source.texture.to(device), source.visibility.to(device)
+            ).cpu()
+    finally:
+        torch.set_num_threads(threads)
 
 
 def grow_mask(iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S"]:

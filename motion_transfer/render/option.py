@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any, Literal
 
 Kind = Literal["path", "text", "integer", "rate", "frames", "flag", "switch", "garments"]
@@ -65,7 +66,7 @@ def option(
         "default": None if default is REQUIRED else default,
         "required": default is REQUIRED,
         "choices": choices,
-        "metavar": metavar or ("|".join(choices) or None),
+        "metavar": metavar or "|".join(choices) or ("PATH" if kind == "path" else None),
         "in_manifest": in_manifest,
     }
     if default is REQUIRED:
@@ -73,6 +74,7 @@ def option(
     return field(default=default, metadata=words)
 
 
-def list_options(options_class: type) -> list[Option]:
+@cache
+def list_options(options_class: type) -> tuple[Option, ...]:
     """Every described field of a dataclass, in order."""
-    return [Option(name=entry.name, **entry.metadata) for entry in fields(options_class)]
+    return tuple(Option(name=entry.name, **entry.metadata) for entry in fields(options_class))

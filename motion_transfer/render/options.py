@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # help has to be instant, and these need the libraries that d
 
 CHANNEL_ORDERS = ("iuv", "vui")
 RENDERERS = ("texture", "nhrr")
+NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
 DEFAULT_RATE = Fraction(30)
 LONGEST_RATE_TERM = 2**31 - 1  # what FFmpeg's fractions hold
@@ -317,4 +318,6 @@ def parse_word(entry: Option, value: Any) -> Any:
 def options_from_words(words: Mapping[str, Any]) -> RenderOptions:
     """Options from what was written, by field name. Raises: InputError for a value that is none."""
     entries = {entry.name: entry for entry in list_options(RenderOptions)}
-    return RenderOptions(**{name: parse_word(entries[name], value) for name, value in words.items()})
+    return RenderOptions(
+        **{name: parse_word(entries[name], value) for name, value in words.items()}
+    )

@@ -124,9 +124,7 @@ def plan_path(
     people = [frame.people for frame in seen]
     inhabited = next((i for i, found in enumerate(people) if found.persons), None)
     if inhabited is None:
-        raise InputError(
-            f"{where}: no person in any of the frames {chosen.start}:{chosen.stop}"
-        )
+        raise InputError(f"{where}: no person in any of the frames {chosen.start}:{chosen.stop}")
     if inhabited > 0:
         raise InputError(
             f"{where_first}: no person in the first frame; start with"

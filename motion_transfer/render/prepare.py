@@ -12,7 +12,7 @@ from motion_transfer.media.formats import OutputFormat
 from motion_transfer.media.iuv_image import ChannelOrder
 from motion_transfer.media.iuv_stream import IuvReader, Missing, list_gaps, open_reader, open_stream
 from motion_transfer.media.stream import IuvStream
-from motion_transfer.people.stream import is_motion
+from motion_transfer.people.motion_name import is_motion
 from motion_transfer.render.canvas import Canvas
 from motion_transfer.render.compose import Comparison, make_background
 from motion_transfer.render.content import chunk_key, digest_file, run_key, source_key

@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -22,6 +23,10 @@ from motion_transfer.render.source import Source
 TEXTURE_SIZE = 256
 COMPILE_PAYS_FRAMES = 300  # a driver this long earns back the half minute that compiling takes
 KEPT_NETWORKS = 2  # a process keeps so many warm
+
+if TYPE_CHECKING:
+    from motion_transfer.render.neural_renderer import PreparedNetwork
+    from nhrr_core import NeuralReRenderer
 
 Appearance = Shaped[np.ndarray, "..."]
 """What a renderer knows of a source: the network's feature map, or the table of its texture."""
@@ -65,7 +70,9 @@ class Recipe:
             from motion_transfer.render.texture_renderer import tabulate_texture
 
             return tabulate_texture(source)
-        return _open_network(self).encode(source).numpy()
+        from motion_transfer.render.neural_renderer import encode_source
+
+        return encode_source(_open_model(self.weights, self.weights_digest), source).numpy()
 
     def renderer(self, appearance: Appearance) -> Renderer:
         """A renderer of one source; the network stays warm between calls. Raises: WeightsError."""
@@ -79,13 +86,20 @@ class Recipe:
 
 
 @lru_cache(maxsize=KEPT_NETWORKS)
-def _open_network(recipe: Recipe):  # noqa: ANN202 (its module is imported when it is needed)
-    from motion_transfer.render.neural_renderer import PreparedNetwork
+def _open_model(weights: Path, _digest: str) -> NeuralReRenderer:
     from motion_transfer.weights import load_checkpoint
+
+    return load_checkpoint(weights).to("cuda" if torch.cuda.is_available() else "cpu")
+
+
+@lru_cache(maxsize=KEPT_NETWORKS)
+def _open_network(recipe: Recipe) -> PreparedNetwork:
+    from motion_transfer.render.neural_renderer import PreparedNetwork
 
     if recipe.weights is None:
         raise InputError("the nhrr renderer needs weights")
-    return PreparedNetwork(load_checkpoint(recipe.weights), compile=recipe.compile)
+    model = _open_model(recipe.weights, recipe.weights_digest)
+    return PreparedNetwork(model, compile=recipe.compile)
 
 
 def choose_recipe(

@@ -16,8 +16,8 @@ from motion_transfer.media.publish import (
     work_folder,
 )
 from motion_transfer.media.segments import join_segments, segment_path
-from motion_transfer.media.work import WorkFolder, was_published
-from motion_transfer.render.content import digest_file, key_of
+from motion_transfer.media.work import WorkFolder, key_of, was_published
+from motion_transfer.render.content import digest_file
 from motion_transfer.render.engine import Engine
 from motion_transfer.render.events import (
     Finished,
@@ -194,7 +194,9 @@ def _render(
     missing = missing_chunks(prepared, work)
     done = frame_count - sum(chunk.stop - chunk.start for chunk in missing)
     if done:
-        listener(Notice(f"{done} of {frame_count} frames were finished before; going on from there"))
+        listener(
+            Notice(f"{done} of {frame_count} frames were finished before; going on from there")
+        )
     listener(Stage("render", frame_count))
     listener(FramesDone(done))
 

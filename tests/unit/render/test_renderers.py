@@ -7,7 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motion_transfer.render.neural_renderer import NeuralRenderer, PreparedNetwork, grow_mask
+from motion_transfer.render.neural_renderer import (
+    NeuralRenderer,
+    PreparedNetwork,
+    encode_source,
+    grow_mask,
+)
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.source import Source, prepare_source
@@ -25,8 +30,8 @@ def source(studio) -> Source:
 def renderer(request, source: Source, checkpoint: Path) -> Renderer:
     if request.param == "texture":
         return TextureRenderer(tabulate_texture(source))
-    network = PreparedNetwork(load_checkpoint(checkpoint), compile=False)
-    return NeuralRenderer(network, network.encode(source))
+    model = load_checkpoint(checkpoint)
+    return NeuralRenderer(PreparedNetwork(model, compile=False), encode_source(model, source))
 
 
 def crops(studio, renderer: Renderer) -> np.ndarray:
