@@ -6,7 +6,7 @@ change; where they did, the content itself decides.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,12 @@ from motion_transfer.version import __version__
 
 NOT_DRAWN = ("workers", "restart", "force")
 Signature = dict[str, Any]
+Files = dict[str, list[str]]
+"""Path -> what its status is, and the digest of its content."""
 
 
-def input_files(options: RenderOptions) -> Iterator[Path]:
-    """Every file and folder that a run reads. Raises: InputError if a photo's IUV is missing."""
+def source_files(options: RenderOptions) -> Iterator[Path]:
+    """What a source's appearance is made from. Raises: InputError if a photo's IUV is missing."""
     yield options.source
     yield options.source_iuv or find_iuv_beside(options.source)
     for garment in options.garments:
@@ -31,15 +33,30 @@ def input_files(options: RenderOptions) -> Iterator[Path]:
         yield garment.iuv or find_iuv_beside(garment.photo)
     if options.weights is not None:
         yield options.weights
-    if options.audio is not None and str(options.audio) != NO_AUDIO:
-        yield options.audio
+
+
+def driver_files(options: RenderOptions) -> Iterator[Path]:
+    """The driver, unless it is a motion."""
     if not is_motion(options.driver):
         yield options.driver
 
 
-def sign(options: RenderOptions) -> Signature:
-    """What a finished job notes of its options, inputs and output. Raises: OSError, InputError."""
-    files = {str(path): [_status(path), digest_of(path)] for path in input_files(options)}
+def audio_files(options: RenderOptions) -> Iterator[Path]:
+    """The sound, if a file is named."""
+    if options.audio is not None and str(options.audio) != NO_AUDIO:
+        yield options.audio
+
+
+def sign_files(paths: Iterable[Path]) -> Files:
+    """Status and digest of files and folders; sign before reading. Raises: InputError."""
+    try:
+        return {str(path): [_status(path), digest_of(path)] for path in paths}
+    except FileNotFoundError as error:
+        raise InputError(f"{error.filename} does not exist") from None
+
+
+def sign(options: RenderOptions, files: Files) -> Signature:
+    """What is remembered of a published output, to know it again. Raises: OSError."""
     return {"options": _options_key(options), "files": files, "output": _status(options.output)}
 
 
@@ -50,7 +67,8 @@ def is_current(options: RenderOptions, signature: Signature) -> bool:
             return False
         if signature["output"] != _status(options.output):
             return False
-        paths = {str(path): path for path in input_files(options)}
+        parts = (driver_files(options), source_files(options), audio_files(options))
+        paths = {str(path): path for part in parts for path in part}
         return paths.keys() == signature["files"].keys() and all(
             signature["files"][name][0] == _status(path)
             or signature["files"][name][1] == digest_of(path)

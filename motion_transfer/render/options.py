@@ -240,15 +240,20 @@ def parse_colour(background: str) -> tuple[int, int, int] | None:
 
 def parse_frames(text: str) -> tuple[int | None, int | None]:
     """`10:50`, `10:`, `:50` or `12` as a half-open range. Raises: InputError."""
+    return parse_range(text, "frames")
+
+
+def parse_range(text: str, what: str) -> tuple[int | None, int | None]:
+    """A half-open range of what is counted from 0, either end open. Raises: InputError."""
     try:
         if ":" not in text:
             return int(text), int(text) + 1
         start, stop = text.split(":")
         ends = int(start) if start else None, int(stop) if stop else None
     except ValueError:
-        raise InputError(f"frames {text!r}; write START:STOP, such as 10:50, 10: or :50") from None
+        raise InputError(f"{what} {text!r}; write START:STOP, such as 10:50, 10: or :50") from None
     if any(end is not None and end < 0 for end in ends):
-        raise InputError(f"frames {text!r}; frames count from 0 and never from the end")
+        raise InputError(f"{what} {text!r}; {what} count from 0 and never from the end")
     return ends
 
 
