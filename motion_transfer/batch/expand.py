@@ -1,8 +1,7 @@
-"""From a manifest to its jobs: defaults laid under, globs and matrices spread out, outputs checked."""
+"""From a manifest to its jobs: defaults laid under, globs and matrices spread, outputs checked."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -131,7 +130,7 @@ class _Spread:
         fixed = word in BELOW_ROOT or (word == "audio" and value == NO_AUDIO)
         if OPTIONS[word].kind != "path" or fixed or is_motion(value):
             return value
-        return value if os.path.isabs(value) else f"{self._folder}{os.sep}{value}"
+        return value if value.startswith("/") else f"{self._folder}/{value}"
 
     def _matches(self, place: Place, patterns: Sequence[str], *, photos: bool) -> list[str]:
         found: list[str] = []
@@ -163,7 +162,7 @@ class _Spread:
         if real_parent is None:
             real_parent = self._real_parents.setdefault(path.parent, path.parent.resolve())
         if (
-            os.path.isabs(written)
+            written.startswith("/")
             or ".." in written.split("/")
             or not real_parent.is_relative_to(self._real_root)
             or path.is_symlink()

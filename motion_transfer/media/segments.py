@@ -183,7 +183,7 @@ def join_segments(
 
 
 def _link(file: Path, destination: Path) -> None:
-    """A second name for a file, so that its segment stays whole; a copy where there are no links."""
+    """A second name for a file, so that its segment stays whole; else a copy."""
     try:
         destination.hardlink_to(file)
     except OSError:
