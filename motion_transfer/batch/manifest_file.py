@@ -115,7 +115,7 @@ class ManifestText:
         value, kind = detail["input"], detail["type"]
         if kind == "extra_forbidden":
             known = self._known_fields(place)
-            near = difflib.get_close_matches(str(place[-1]), known, 1)
+            near = difflib.get_close_matches(str(list(place)[-1]), known, 1)
             hint = f"did you mean {near[0]}? " if near else ""
             return f"{self.where(place)}: unknown field; {hint}allowed are {', '.join(known)}"
         if kind == "missing":
@@ -125,7 +125,7 @@ class ManifestText:
 
     def _known_fields(self, place: Place) -> list[str]:
         model: Any = Manifest
-        for step in place[:-1]:
+        for step in list(place)[:-1]:
             if isinstance(step, str) and step in model.model_fields:
                 annotation = model.model_fields[step].annotation
                 inner = getattr(annotation, "__args__", None)

@@ -33,6 +33,7 @@ class RayWorkers:
         """
         try:
             import ray
+            from ray.exceptions import ObjectLostError, RayActorError, WorkerCrashedError
         except ImportError:
             raise InputError(
                 f"the ray engine is not installed; pip install '{CLUSTER_EXTRA}'"
@@ -54,9 +55,9 @@ class RayWorkers:
                     f"no Ray cluster at {address}: {error}; start one with `ray start --head`"
                 ) from error
         self.lost_error: tuple[type[BaseException], ...] = (
-            ray.exceptions.RayActorError,
-            ray.exceptions.WorkerCrashedError,
-            ray.exceptions.ObjectLostError,
+            RayActorError,
+            WorkerCrashedError,
+            ObjectLostError,
         )
         resources = ray.cluster_resources()
         self._gpus = int(resources.get("GPU", 0))
@@ -79,7 +80,7 @@ class RayWorkers:
     def forget(self, name: str) -> None:
         self._blobs.pop(name, None)
 
-    def stop(self, *, now: bool) -> None:
+    def stop(self, *, now: bool) -> None:  # noqa: ARG002 (the protocol's)
         for actor in filter(None, self._actors):
             self._ray.kill(actor)
         self._blobs.clear()

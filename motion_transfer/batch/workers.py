@@ -52,7 +52,7 @@ class Workers(Protocol):
 class LocalWorkers:
     """Processes of this machine; blobs go through files."""
 
-    lost_error = (BrokenProcessPool,)
+    lost_error: tuple[type[BaseException], ...] = (BrokenProcessPool,)
 
     def __init__(self, count: int, scratch: Path) -> None:
         """Args: scratch, an own folder for blobs, emptied here and removed by `stop`."""

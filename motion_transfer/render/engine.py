@@ -10,19 +10,17 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from hashlib import sha256
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from motion_transfer.errors import InputError, RenderError
-from motion_transfer.media.iuv_stream import IuvReader
 from motion_transfer.media.segments import open_segment
 from motion_transfer.render.canvas import Image
 from motion_transfer.render.events import FramesDone, Listener, ignore
 from motion_transfer.render.person import isolate
-from motion_transfer.render.plan import Chunk
+from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
 from motion_transfer.render.prepare import Prepared
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.sheet import ContactSheet
@@ -42,7 +40,7 @@ class Engine:
         self,
         prepared: Prepared,
         *,
-        reader: IuvReader,
+        reader: FrameReader,
         renderer: Renderer,
         sheet: ContactSheet | None = None,
         listener: Listener = ignore,
@@ -136,7 +134,7 @@ class Engine:
         frames = self._reader.read(first + chunk.start, first + chunk.stop)
         plans = self._plan.frames[chunk.start : chunk.stop]
         for index, (plan, iuv) in enumerate(zip(plans, frames, strict=True), first + chunk.start):
-            if sha256(iuv).hexdigest() != plan.digest:
+            if digest_of_iuv(iuv) != plan.digest:
                 raise InputError(
                     f"{self._reader.stream.where(index)} has changed since the run began; start"
                     " again when it is complete"

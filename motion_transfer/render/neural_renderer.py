@@ -19,7 +19,7 @@ MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leav
 
 
 class PreparedNetwork:
-    """A model on the best device there is, in bf16 where that is fast; serves any number of sources.
+    """A model on the best device there is, in bf16 where that is fast; for any number of sources.
 
     Compiling happens here, before the first frame is asked for.
     """
@@ -51,11 +51,8 @@ class PreparedNetwork:
             fast = FastRenderNet(net, dtype=self.dtype)
             if self.config.image_size % fast.multiple == 0:
                 return fast
-        plain = (
-            deepcopy(net)
-            .to(device=self.device, dtype=self.dtype)
-            .to(memory_format=torch.channels_last)
-        )  # pyright: ignore[reportCallIssue]
+        plain = deepcopy(net).to(device=self.device, dtype=self.dtype)
+        plain = plain.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
         run = torch.compile(plain) if compile else plain
         return lambda features: run(
             features.to(self.dtype, memory_format=torch.channels_last)

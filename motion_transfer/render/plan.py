@@ -7,9 +7,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_stream import IuvReader
+from motion_transfer.media.stream import IuvStream
 from motion_transfer.render.person import People, Person, choose_person, find_people, follow
 from motion_transfer.render.window import Window, plan_window
 
@@ -17,6 +22,22 @@ CHUNK_FRAMES = 48
 """Cut points are multiples of this, whatever the number of workers: they decide the bytes."""
 
 SCAN_FRAMES = 16
+
+
+class FrameReader(Protocol):
+    """What is asked of a driver while it is rendered; an `IuvReader` is one."""
+
+    @property
+    def stream(self) -> IuvStream: ...
+
+    def read(self, start: int, stop: int) -> Iterator[np.ndarray]:
+        """Frames start..stop-1, H x W x 3 uint8, (I, U, V)."""
+        ...
+
+
+def digest_of_iuv(iuv: UInt8[np.ndarray, "H W 3"]) -> str:
+    """Of a frame's content; hexadecimal."""
+    return sha256(np.ascontiguousarray(iuv).data).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -90,7 +111,7 @@ def scan_people(
     def scan(start: int) -> list[SeenFrame]:
         block = range(start, min(start + SCAN_FRAMES, frames.stop))
         found = [
-            SeenFrame(find_people(iuv), sha256(iuv).hexdigest())
+            SeenFrame(find_people(iuv), digest_of_iuv(iuv))
             for iuv in reader.read(block.start, block.stop)
         ]
         done(len(found))

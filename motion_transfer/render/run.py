@@ -194,9 +194,7 @@ def _render(
     missing = missing_chunks(prepared, work)
     done = frame_count - sum(chunk.stop - chunk.start for chunk in missing)
     if done:
-        listener(
-            Notice(f"{done} of {frame_count} frames were finished before; going on from there")
-        )
+        listener(Notice(f"{done} of {frame_count} frames were finished before; going on there"))
     listener(Stage("render", frame_count))
     listener(FramesDone(done))
 
