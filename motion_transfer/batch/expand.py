@@ -20,6 +20,7 @@ from motion_transfer.render.options import NO_AUDIO, RenderOptions, options_from
 OPTIONS = {entry.word: entry for entry in list_options(RenderOptions)}
 BELOW_ROOT = ("output", "sheet")
 GLOB_MARKS = "*?["
+ANY_OUTPUT = "OUTPUT"
 
 
 @dataclass(frozen=True)
@@ -105,9 +106,12 @@ class _Spread:
         }
         try:
             options = options_from_words(fields)
-            _check_format(options.output.suffix.lower(), options.codec, options.crf)
+            reason = _unwritable(options.output.suffix, options.codec, options.crf)
         except InputError as error:
             raise ManifestError(f"{self._text.where(place)}: {error}") from None
+        if reason:
+            reason = reason.replace(ANY_OUTPUT, str(options.output.with_suffix("")), 1)
+            raise ManifestError(f"{self._text.where(place)}: {reason}")
         name = getattr(entry, "name", None) or str(options.output.relative_to(self._root))
         return options, name
 
@@ -175,11 +179,15 @@ class _Spread:
 
 
 @cache
-def _check_format(suffix: str, codec: str | None, crf: int | None) -> None:
-    """Raises: OutputError for what cannot be written."""
+def _unwritable(suffix: str, codec: str | None, crf: int | None) -> str:
+    """Why no `ANY_OUTPUT` of that ending and codec can be written; empty if it can."""
     from motion_transfer.media.formats import choose_format  # loads the libraries of codecs
 
-    choose_format(Path(f"output{suffix}"), codec=codec, crf=crf)
+    try:
+        choose_format(Path(f"{ANY_OUTPUT}{suffix}"), codec=codec, crf=crf)
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 @cache

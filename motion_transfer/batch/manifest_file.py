@@ -163,6 +163,8 @@ def _set(data: dict[str, Any], setting: str) -> None:
         parsed = yaml.load(value, Loader=_Loader)
     except yaml.YAMLError:
         parsed = value
+    if parsed is None and value.strip() not in ("", "~", "null"):
+        parsed = value  # such as #102030, which YAML takes for a comment
     if key in Manifest.model_fields:
         data[key] = parsed
         return

@@ -46,9 +46,9 @@ def test_jobs_take_exactly_the_options_of_a_run() -> None:
 
 
 def test_the_options_know_the_channel_orders() -> None:
-    from motion_transfer.media.iuv_image import CHANNEL_ORDERS as known
+    from motion_transfer.media import iuv_image
 
-    assert known == CHANNEL_ORDERS
+    assert iuv_image.CHANNEL_ORDERS == CHANNEL_ORDERS
 
 
 def test_three_syntaxes_mean_the_same(tmp_path: Path) -> None:
@@ -57,8 +57,13 @@ def test_three_syntaxes_mean_the_same(tmp_path: Path) -> None:
         "version": 1,
         "jobs": [
             {
-                "source": "a.png", "driver": "d", "output": "a.mp4", "fps": "30000/1001",
-                "compare": True, "crf": 20, "frames": "3:9",
+                "source": "a.png",
+                "driver": "d",
+                "output": "a.mp4",
+                "fps": "30000/1001",
+                "compare": True,
+                "crf": 20,
+                "frames": "3:9",
             }
         ],
     }
@@ -109,13 +114,13 @@ WRONG = {
     "number": ({"crf": "low"}, "shoot.yaml:7: jobs[0].crf: 'low': Input should be a valid integ"),
     "parts": (
         {"garments": "[{photo: x.png, parts: hat}]"},
-        "shoot.yaml:7: jobs[0].garments: [GarmentEntry(photo='x.png', parts='hat', iuv=None)]: unk",
+        "shoot.yaml:7: jobs[0].garments: [{'photo': 'x.png', 'parts': 'hat'}]: unknown part 'hat'",
     ),
     "template": ({"output": "'{who}.mp4'"}, "shoot.yaml:6: jobs[0].output: '{who}.mp4' is no te"),
     "glob": ({"source": "'*.gif'"}, "shoot.yaml:4: jobs[0].source: '*.gif' matches nothing"),
-    "together": ({"renderer": "texture", "weights": "w"}, "shoot.yaml:3: jobs[0]: the texture r"),
-    "ending": ({"output": "a.xyz"}, "shoot.yaml:3: jobs[0]: cannot write output.xyz: unknown end"),
-    "codec": ({"codec": "vp8"}, "shoot.yaml:3: jobs[0]: unknown codec 'vp8'; supported are h264"),
+    "together": ({"renderer": "texture", "weights": "w"}, "shoot.yaml:4: jobs[0]: the texture r"),
+    "ending": ({"output": "a.xyz"}, "shoot.yaml:4: jobs[0]: cannot write FOLDER/a.xyz: unknown "),
+    "codec": ({"codec": "vp8"}, "shoot.yaml:4: jobs[0]: unknown codec 'vp8'; supported are h264"),
     "dots": ({"output": "../a.mp4"}, "shoot.yaml:6: jobs[0].output: '../a.mp4' leaves the output"),
     "absolute": ({"output": "/a.mp4"}, "shoot.yaml:6: jobs[0].output: '/a.mp4' leaves the output"),
 }
@@ -124,7 +129,9 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, case: str) -> None:
     words, message = WRONG[case]
-    assert refusal(write(tmp_path, job_text(**words))).startswith(f"{tmp_path}/{message}")
+    assert refusal(write(tmp_path, job_text(**words))).startswith(
+        f"{tmp_path}/{message.replace('FOLDER', str(tmp_path))}"
+    )
 
 
 def test_links_do_not_lead_out_of_the_root(tmp_path: Path) -> None:
@@ -140,7 +147,7 @@ def test_links_do_not_lead_out_of_the_root(tmp_path: Path) -> None:
 def test_two_jobs_cannot_have_one_output(tmp_path: Path) -> None:
     text = job_text() + "  - {source: b.png, driver: d, output: ./a.mp4}\n"
     assert "shoot.yaml:7: jobs[1].output:" in refusal(write(tmp_path, text))
-    assert "shoot.yaml:6: jobs[0]" in refusal(write(tmp_path, text))
+    assert "shoot.yaml:4: jobs[0]" in refusal(write(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -148,7 +155,7 @@ def test_two_jobs_cannot_have_one_output(tmp_path: Path) -> None:
     [
         ("version: 1\njobs: [", ".yaml", "shoot.yaml:"),
         ('{"version": 1,', ".json", "line 1 column"),
-        ("version = ", ".toml", "line 1"),
+        ("version = ]", ".toml", "line 1"),
         ("version: 2\njobs: []\n", ".yaml", "shoot.yaml:1: version: 2: Input should be 1"),
         ("jobs: []\n", ".yaml", "version: is missing"),
         ("version: 1\n", ".yaml", "no jobs"),
