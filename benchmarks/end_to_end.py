@@ -58,7 +58,7 @@ def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> N
     window = prepared.plan.window
     crops = np.stack([window.cut(iuv, 256) for iuv in reader.read(0, renderer.batch_size)])
     ratios = []
-    for index in range(rounds):
+    for _ in range(rounds):
         began = time.perf_counter()
         for _ in range(frame_count // renderer.batch_size):
             renderer.render(crops)
