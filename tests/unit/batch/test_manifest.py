@@ -119,7 +119,7 @@ WRONG = {
     "template": ({"output": "'{who}.mp4'"}, "shoot.yaml:6: jobs[0].output: '{who}.mp4' is no te"),
     "glob": ({"source": "'*.gif'"}, "shoot.yaml:4: jobs[0].source: '*.gif' matches nothing"),
     "together": ({"renderer": "texture", "weights": "w"}, "shoot.yaml:4: jobs[0]: the texture r"),
-    "ending": ({"output": "a.xyz"}, "shoot.yaml:4: jobs[0]: cannot write FOLDER/a.xyz: unk"),
+    "ending": ({"output": "a.xyz"}, "shoot.yaml:4: jobs[0]: cannot write FOLDER/a.xyz: un"),
     "codec": ({"codec": "vp8"}, "shoot.yaml:4: jobs[0]: unknown codec 'vp8'; supported are h264"),
     "dots": ({"output": "../a.mp4"}, "shoot.yaml:6: jobs[0].output: '../a.mp4' leaves the output"),
     "absolute": ({"output": "/a.mp4"}, "shoot.yaml:6: jobs[0].output: '/a.mp4' leaves the output"),
