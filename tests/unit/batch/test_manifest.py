@@ -97,8 +97,8 @@ def test_a_matrix_and_globs_spread(tmp_path: Path) -> None:
     for name in ("b.png", "a.png", "a_IUV.png", "b_iuv.png", "walk.mkv", "run.mkv"):
         (tmp_path / name).touch()
     text = (
-        "version: 1\nmatrix:\n  - sources: ['*.png']\n    drivers: ['*.mkv', 'people:wave,frames=3']"
-        "\n    output: '{source}/{index}_{driver}.mp4'\n"
+        "version: 1\nmatrix:\n  - sources: ['*.png']\n    drivers:"
+        " ['*.mkv', 'people:wave,frames=3']\n    output: '{source}/{index}_{driver}.mp4'\n"
     )
     outputs = [str(j.options.output.relative_to(tmp_path)) for j in jobs_of(write(tmp_path, text))]
     assert outputs == [
