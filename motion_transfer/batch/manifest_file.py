@@ -145,7 +145,7 @@ class ManifestText:
             if index >= len(headers):
                 return None
             start = headers[index]
-        key = re.compile(rf"\s*{re.escape(str(place[-1]))}\s*=")
+        key = re.compile(rf"\s*{re.escape(str(list(place)[-1]))}\s*=")
         for number in range(start, len(lines)):
             if key.match(lines[number]):
                 return number + 1
