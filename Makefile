@@ -9,7 +9,7 @@ ifneq ($(wildcard ../shared/data),)
 export MT_SAMPLES ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo test lint check lock clean
+.PHONY: demo test lint check schema lock clean
 
 demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion
 	$(BIN)/mt demo --output demo.mp4 --force
@@ -22,6 +22,9 @@ lint: $(VENV)/.installed-dev  ## style, types, and the direction of imports
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
+
+schema: $(VENV)/.installed  ## publish the JSON Schema of manifests
+	$(BIN)/python tools/build_schema.py
 
 check: lint demo test  ## everything that has to pass before a change lands
 

@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from fractions import Fraction
+from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, before torch
@@ -26,16 +26,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, befo
 import numpy as np
 from workload import SOURCE, driver_folder, random_checkpoint
 
-from motion_transfer.media.formats import choose_format
-from motion_transfer.media.iuv_stream import open_reader, open_stream
-from motion_transfer.render.engine import Canvas, Engine
+from motion_transfer.render.engine import Engine
 from motion_transfer.render.events import ignore
-from motion_transfer.render.neural_renderer import NeuralRenderer
 from motion_transfer.render.options import RenderOptions
-from motion_transfer.render.plan import plan_driver
-from motion_transfer.render.run import run
-from motion_transfer.render.source import prepare_source
-from motion_transfer.weights import load_checkpoint
+from motion_transfer.render.run import prepare, run
 
 
 def texture_rate(folder: Path, frame_count: int, rounds: int) -> None:
@@ -57,43 +51,23 @@ def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> N
         output=folder / "nhrr.mp4",
         weights=random_checkpoint(folder, preset),
     )
-    model = load_checkpoint(random_checkpoint(folder, preset))
-    source = prepare_source(options, model.config.texture_size)
     began = time.perf_counter()
-    renderer = NeuralRenderer(model, source, compile=True)
-    batch = np.zeros((renderer.batch_size, 256, 256, 3), np.uint8)
-    renderer.render(batch)
-    print(f"nhrr, {preset}: compiled in {time.perf_counter() - began:.0f} s")
-
-    reader = open_reader(open_stream(driver))
-    plan = plan_driver(
-        reader,
-        frames=(None, None),
-        frame_rate=Fraction(30),
-        person="largest",
-        workers=2,
-        done=ignore,
-    )
-    crops = np.stack([plan.window.cut(iuv, 256) for iuv in reader.read(0, renderer.batch_size)])
-    background = np.full((reader.height, reader.width, 3), 255, np.uint8)
+    prepared, appearance = prepare(replace(options, compile=True), ignore)
+    renderer, reader = prepared.recipe.renderer(appearance), prepared.driver.open()
+    print(f"nhrr, {preset}: prepared and compiled in {time.perf_counter() - began:.0f} s")
+    window = prepared.plan.window
+    crops = np.stack([window.cut(iuv, 256) for iuv in reader.read(0, renderer.batch_size)])
     ratios = []
-    for index in range(rounds):
+    for _ in range(rounds):
         began = time.perf_counter()
         for _ in range(frame_count // renderer.batch_size):
             renderer.render(crops)
         alone = (time.perf_counter() - began) / frame_count
         with tempfile.TemporaryDirectory(dir=folder) as work:
+            chunks = [(c, Path(work) / f"{c.index}.nut") for c in prepared.plan.chunks]
             began = time.perf_counter()
-            Engine(
-                reader=reader,
-                plan=plan,
-                renderer=renderer,
-                canvas=Canvas(background, crop=False, comparison=None),
-                output_format=choose_format(options.output, codec=None, crf=None),
-                workers=2,
-                sheet=None,
-                listener=ignore,
-            ).run(Path(work), folder / f"nhrr_{index}.mp4")
+            engine = Engine(prepared, reader=reader, renderer=renderer)
+            engine.render(chunks, 2, lambda _chunk, _path: None)
             whole = (time.perf_counter() - began) / frame_count
         ratios.append(whole / alone)
         print(f"  model {alone * 1e3:.1f} ms a frame, end to end {whole * 1e3:.1f} ms")

@@ -20,7 +20,7 @@ from motion_transfer.render.completion import complete_texture
 from motion_transfer.render.compose import colour_iuv, paste
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.source import prepare_source
-from motion_transfer.render.texture_renderer import TextureRenderer
+from motion_transfer.render.texture_renderer import TextureRenderer, tabulate_texture
 from motion_transfer.render.window import Window
 from nhrr_core import load_uv_layout
 
@@ -38,7 +38,7 @@ def main() -> None:
     )
     source = prepare_source(options, 256)
     reader = open_reader(open_stream(options.driver))
-    renderer = TextureRenderer(source)
+    renderer = TextureRenderer(tabulate_texture(source))
     targets = [next(iter(reader.read(moment, moment + 1))) for moment in MOMENTS]
     results = []
     for iuv in targets:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import click
+
+from motion_transfer.render.option import Option, list_options
 
 
 class SectionOption(click.Option):
@@ -54,3 +57,41 @@ class WordsCommand(SectionCommand):
                 used = True
             spread.append(word)
         return super().parse_args(ctx, spread)
+
+
+def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A decorator: every option of a run, as `RenderOptions` describes it."""
+    from motion_transfer.render.options import RenderOptions
+
+    for entry in reversed(list_options(RenderOptions)):
+        for decorate in reversed(_decorators(entry)):
+            command = decorate(command)
+    return command
+
+
+def _decorators(entry: Option) -> list[Callable[..., Any]]:
+    common: dict[str, Any] = {"cls": SectionOption, "section": entry.section, "help": entry.help}
+    if entry.kind == "garments":
+        photo, parts = entry.flags
+        return [
+            click.option(photo, entry.name, multiple=True, metavar="PHOTO[,IUV]", **common),
+            click.option(
+                parts,
+                multiple=True,
+                metavar="PARTS",
+                **{
+                    **common,
+                    "help": "Such as torso,upper-legs; `mt info parts` lists the names.",
+                },
+            ),
+        ]
+    if entry.kind == "flag":
+        common["is_flag"] = True
+    elif entry.kind == "switch":
+        common["default"] = None
+    else:
+        common |= {"type": int if entry.kind == "integer" else str, "metavar": entry.metavar}
+        common["required"] = entry.required
+        if entry.kind == "text":
+            common["default"] = entry.default
+    return [click.option(*entry.flags, entry.name, **common)]

@@ -116,19 +116,20 @@ class TextureCandidate(RenderedCandidate):
         return {"label": self.label, "kind": "renderer", "renderer": "texture"}
 
     def open_renderer(self, source: Source) -> Renderer:
-        from motion_transfer.render.texture_renderer import TextureRenderer
+        from motion_transfer.render.texture_renderer import TextureRenderer, tabulate_texture
 
-        return TextureRenderer(source)
+        return TextureRenderer(tabulate_texture(source))
 
 
 class WeightsCandidate(RenderedCandidate):
     """The network with one checkpoint. Raises: WeightsError."""
 
     def __init__(self, path: Path, background: str) -> None:
-        from motion_transfer.render.neural_renderer import choose_dtype
+        from motion_transfer.render.neural_renderer import PreparedNetwork, choose_dtype
         from motion_transfer.weights import load_checkpoint
 
         self._model = load_checkpoint(path)
+        self._network = PreparedNetwork(self._model, compile=False)
         self._path = path
         self._choose_dtype = choose_dtype
         super().__init__(
@@ -151,9 +152,9 @@ class WeightsCandidate(RenderedCandidate):
         }
 
     def open_renderer(self, source: Source) -> Renderer:
-        from motion_transfer.render.neural_renderer import NeuralRenderer
+        from motion_transfer.render.neural_renderer import NeuralRenderer, encode_source
 
-        return NeuralRenderer(self._model, source, compile=False)
+        return NeuralRenderer(self._network, encode_source(self._model, source))
 
 
 class FolderCandidate:

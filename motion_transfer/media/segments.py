@@ -25,6 +25,7 @@ from av.video.reformatter import ColorRange, Colorspace, Interpolation
 from jaxtyping import UInt8
 
 from motion_transfer.errors import OutputError
+from motion_transfer.media.audio import AudioCut, AudioTrack
 from motion_transfer.media.formats import OutputFormat
 from motion_transfer.media.gif import write_gif
 from motion_transfer.media.image import write_png
@@ -165,19 +166,28 @@ def join_segments(
     destination: Path,
     output_format: OutputFormat,
     rate: Fraction,
+    audio: AudioCut | None = None,
 ) -> None:
     """Make the output of finished segments, given with the number of frames in each."""
     if output_format.kind == "frames":
         destination.mkdir()
         for folder, _ in segments:
             for file in folder.iterdir():
-                file.rename(destination / file.name)
+                _link(file, destination / file.name)
     elif output_format.kind == "image":
-        shutil.move(next(segments[0][0].iterdir()), destination)
+        _link(next(segments[0][0].iterdir()), destination)
     elif output_format.kind == "gif":
         write_gif([path for path, _ in segments], destination, rate)
     else:
-        _copy_packets(segments, destination, output_format, rate)
+        _copy_packets(segments, destination, output_format, rate, audio)
+
+
+def _link(file: Path, destination: Path) -> None:
+    """A second name for a file, so that its segment stays whole; else a copy."""
+    try:
+        destination.hardlink_to(file)
+    except OSError:
+        shutil.copyfile(file, destination)
 
 
 def _copy_packets(
@@ -185,12 +195,13 @@ def _copy_packets(
     destination: Path,
     output_format: OutputFormat,
     rate: Fraction,
+    audio: AudioCut | None,
 ) -> None:
     options = {"movflags": "+faststart"} if destination.suffix in (".mp4", ".mov") else {}
     orders = [_showing_order(path, rate) for path, _ in segments]
     delay = max(index - number for order in orders for index, number in enumerate(order))
     with av.open(str(destination), "w", options=options) as output:
-        stream = None
+        stream = sound = None
         first = 0
         for (path, frame_count), order in zip(segments, orders, strict=True):
             with av.open(str(path)) as segment:
@@ -202,6 +213,8 @@ def _copy_packets(
                         _tag_bt709(stream.codec_context)  # VP9 does not carry all of it itself
                     if output_format.codec.tag and destination.suffix in (".mp4", ".mov"):
                         stream.codec_context.codec_tag = output_format.codec.tag
+                    if audio is not None:
+                        sound = AudioTrack(audio, output, destination.suffix)
                 for index, (packet, number) in enumerate(
                     zip(_packets(segment), order, strict=True)
                 ):
@@ -210,8 +223,12 @@ def _copy_packets(
                     packet.duration = 1
                     packet.time_base = 1 / rate
                     packet.stream = stream
+                    if sound is not None:
+                        sound.write_until((first + index) / rate)
                     output.mux(packet)
             first += frame_count
+        if sound is not None:
+            sound.write_until(None)
 
 
 def _tag_bt709(context: VideoCodecContext) -> None:

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_image import Raw
 from motion_transfer.media.stream import IuvStream
+from motion_transfer.people.motion_name import SCHEME
 
 if TYPE_CHECKING:  # every run asks whether its driver is a motion, and few are
     from motion_transfer.people.driver import MotionDriver, MotionOptions
-
-SCHEME = "people:"
 
 
 class MotionStream(IuvStream):
@@ -31,11 +30,6 @@ class MotionStream(IuvStream):
 
     def where(self, index: int) -> str:
         return f"frame {index} of {self.path}"
-
-
-def is_motion(path: Path) -> bool:
-    """Whether a driver's name means a motion and not a file."""
-    return str(path).startswith(SCHEME)
 
 
 def open_motion(path: Path) -> MotionStream:

@@ -16,11 +16,13 @@ class FramePlan:
     """Who is rendered in one frame: nobody (None), or a person, alone in it or to be isolated.
 
     Attributes:
+        digest: of the IUV of the frame that is shown, everybody in it included; hexadecimal.
         held: the driver's frame that is shown because nobody was found in this one; else None.
     """
 
     person: Person | None
     alone: bool
+    digest: str = ""
     held: int | None = None
 
 
@@ -51,6 +53,18 @@ def missing_stretches(frames: Sequence[FramePlan], first: int) -> list[tuple[int
         else:
             stretches.append((number, number + 1))
     return stretches
+
+
+def describe_missing(frames: Sequence[FramePlan], first: int, rate: Fraction) -> str:
+    """In which frames nobody was found and what is shown there; empty if there are none."""
+    stretches = missing_stretches(frames, first)
+    if not stretches:
+        return ""
+    count = sum(stop - start for start, stop in stretches)
+    held = any(frame.held is not None for frame in frames)
+    shown = "the frame before" if held else "background only"
+    times = list_stretches(stretches, first, rate)
+    return f"nobody found in {count} of {len(frames)} frames, {shown}: {times}"
 
 
 def list_stretches(stretches: Sequence[tuple[int, int]], first: int, rate: Fraction) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 
 import cv2
 import numpy as np
@@ -17,10 +18,50 @@ from nhrr_core import FastRenderNet, NeuralReRenderer, RenderNet
 MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leave the IUV
 
 
-class NeuralRenderer:
-    """Runs a model on the best device there is, in bf16 where that is fast.
+class PreparedNetwork:
+    """A model on the best device there is, in bf16 where that is fast; for any number of sources.
 
     Compiling happens here, before the first frame is asked for.
+    """
+
+    batch_size = 4
+
+    def __init__(self, model: NeuralReRenderer, *, compile: bool) -> None:
+        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.dtype = choose_dtype(self.device)
+        self.config = model.config
+        self._model = model.to(self.device)
+        self._draw = self._prepare_net(model.render_net, compile=compile)
+        if compile:
+            side = self.config.image_size
+            blank = torch.zeros(self.batch_size, 3, side, side, dtype=torch.uint8)
+            map_side = self.config.texture_size
+            shape = (1, self.config.map_channels, map_side, map_side)
+            self.draw(torch.zeros(shape, device=self.device), blank)
+
+    def draw(self, feature_map: Tensor, target: Tensor) -> Tensor:
+        """RenderNet's frames, B x 3 or 4 x S x S uint8, of B x 3 x S x S target IUV."""
+        with torch.inference_mode():
+            features = self._model.feature_image(feature_map, target.to(self.device))
+            frame = self._model.blend(self._draw(features), features)
+            return ((frame + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
+
+    def _prepare_net(self, net: RenderNet, *, compile: bool) -> Callable[[Tensor], Tensor]:
+        """Float32 features to a float32 frame, in the form that runs fastest here."""
+        if compile and self.device.type == "cpu":
+            fast = FastRenderNet(net, dtype=self.dtype)
+            if self.config.image_size % fast.multiple == 0:
+                return fast
+        plain = deepcopy(net).to(device=self.device, dtype=self.dtype)
+        plain = plain.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        run = torch.compile(plain) if compile else plain
+        return lambda features: run(
+            features.to(self.dtype, memory_format=torch.channels_last)
+        ).float()
+
+
+class NeuralRenderer:
+    """A prepared network and one source's feature map.
 
     A model with an alpha channel says itself what the person covers. One without, as in the paper,
     paints its own background; what lies beyond the (grown, softened) IUV outline is left out.
@@ -28,48 +69,41 @@ class NeuralRenderer:
 
     name = "nhrr"
     takes_turns = True
+    batch_size = PreparedNetwork.batch_size
 
-    def __init__(self, model: NeuralReRenderer, source: Source, *, compile: bool) -> None:
-        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-        self.dtype = choose_dtype(self.device)
-        self.batch_size = 4
-        self._config = model.config
-        self._model = model.to(self.device)
-        with torch.inference_mode():
-            self._feature_map = self._model.encode_texture(
-                source.texture.to(self.device), source.visibility.to(self.device)
-            )
-        self._draw = self._prepare_net(model.render_net, compile=compile)
-        if compile:
-            side = self._config.image_size
-            self.render(np.zeros((self.batch_size, side, side, 3), np.uint8))
-
-    def _prepare_net(self, net: RenderNet, *, compile: bool) -> Callable[[Tensor], Tensor]:
-        """Float32 features to a float32 frame, in the form that runs fastest here."""
-        if compile and self.device.type == "cpu":
-            fast = FastRenderNet(net, dtype=self.dtype)
-            if self._config.image_size % fast.multiple == 0:
-                return fast
-        plain = net.to(device=self.device, dtype=self.dtype).to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
-        run = torch.compile(plain) if compile else plain
-        return lambda features: run(
-            features.to(self.dtype, memory_format=torch.channels_last)
-        ).float()
+    def __init__(self, network: PreparedNetwork, feature_map: Tensor) -> None:
+        self._network = network
+        self._feature_map = feature_map.to(network.device)
 
     def working_size(self, window_side: int) -> int:
-        return self._config.image_size
+        return self._network.config.image_size
 
     def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:
-        with torch.inference_mode():
-            target = torch.from_numpy(iuv).to(self.device).permute(0, 3, 1, 2)
-            features = self._model.feature_image(self._feature_map, target)
-            frame = self._model.blend(self._draw(features), features)
-            pixels = ((frame + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
-            images = pixels.permute(0, 2, 3, 1).cpu().numpy()
+        target = torch.from_numpy(iuv).permute(0, 3, 1, 2)
+        pixels = self._network.draw(self._feature_map, target)
+        images = pixels.permute(0, 2, 3, 1).cpu().numpy()
         if images.shape[-1] == 4:
             return images
         masks = np.stack([grow_mask(crop) for crop in iuv])
         return np.concatenate([images, masks[..., None]], axis=-1)
+
+
+def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
+    """A source's feature map, 1 x D x T x T, computed where the model lies, returned on the CPU.
+
+    Measured: FeatureNet's last bits depend on the number of threads, so it gets one, wherever it
+    runs; RenderNet's do not.
+    """
+    device = next(model.parameters()).device
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with torch.inference_mode():
+            return model.encode_texture(
+                source.texture.to(device), source.visibility.to(device)
+            ).cpu()
+    finally:
+        torch.set_num_threads(threads)
 
 
 def grow_mask(iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S"]:

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, Any
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.iuv_image import CHANNEL_ORDERS, ChannelOrder
-from motion_transfer.media.iuv_stream import Missing
-from nhrr_core.iuv import PART_GROUPS, PART_NAMES
+from motion_transfer.render.option import REQUIRED, Option, list_options, option
 
+if TYPE_CHECKING:  # help has to be instant, and these need the libraries that do the work
+    from motion_transfer.media.iuv_image import ChannelOrder
+    from motion_transfer.media.iuv_stream import Missing
+
+CHANNEL_ORDERS = ("iuv", "vui")
+MISSING = ("hold", "background", "fail")
 RENDERERS = ("texture", "nhrr")
+NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
 DEFAULT_RATE = Fraction(30)
 LONGEST_RATE_TERM = 2**31 - 1  # what FFmpeg's fractions hold
@@ -31,69 +37,174 @@ class Garment:
 
 @dataclass(frozen=True, kw_only=True)
 class RenderOptions:
-    """The options of `mt run`, with its defaults.
+    """The options of a run: what `mt run` takes, what a manifest's jobs may set, and its defaults.
 
-    Attributes:
-        source, source_iuv: the photo and its IUV; None means: look beside the photo.
-        driver: a folder of IUV images, one IUV image, a lossless IUV video, `.npy`, `.npz`, or a
-            motion, `people:walk` (see `people.stream`).
-        output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder.
-        renderer: `texture` (no weights) or `nhrr` (the network); None: `nhrr` if weights are given.
-        weights: a safetensors checkpoint, for `nhrr`.
-        person, driver_person: `largest`, an index from the left (0 first), or `x0,y0,x1,y1` in px.
-        iuv_order, source_iuv_order: force the channel order, `iuv` or `vui`.
-        missing: what becomes of driver frames in which nobody is found, and of numbers missing
-            from a folder: `fail`, `hold` (the frame before is repeated) or `background`. None:
-            missing numbers fail, frames without anybody are background.
-        frames: half-open range of the driver's frames, either end open.
-        frame_rate: frames per second; None: the driver's own, or 30.
-        codec, crf: of the video; None: the container's default.
-        background: `white`, `#rrggbb`, or `photo` (the source's, without the person).
-        size: `driver` (the result pasted into the driver's frame), `crop` (the square around the
-            person), `even` (as `driver`, grown by a pixel where odd).
-        garments: parts taken from other photos.
-        compare: source, IUV and result side by side.
-        sheet: write a contact sheet there.
-        force: replace an existing output.
-        workers: threads that render chunks; None: one for each core. Never changes the output.
-        compile: let `nhrr` compile the network; None: when the driver is long enough to pay for it.
+    Paths of drivers may name a motion, `people:walk` (see `people.stream`). `frames` is a half-open
+    range of the driver's frames, either end open. A `renderer` of None is `nhrr` if weights are
+    given; a `frame_rate` of None is the driver's own, or 30; `audio` None is the driver's own, if
+    it has one; `missing` None fails for numbers missing from a folder, and shows background where
+    nobody is found. Nothing here but the content of the inputs and what is drawn decides the
+    output's bytes: `workers` never does.
     """
 
-    source: Path
-    driver: Path
-    output: Path
-    source_iuv: Path | None = None
-    renderer: str | None = None
-    weights: Path | None = None
-    person: str = "largest"
-    driver_person: str = "largest"
-    iuv_order: ChannelOrder | None = None
-    source_iuv_order: ChannelOrder | None = None
-    missing: Missing | None = None
-    frames: tuple[int | None, int | None] = (None, None)
-    frame_rate: Fraction | None = None
-    codec: str | None = None
-    crf: int | None = None
-    background: str = "white"
-    size: str = "driver"
-    garments: tuple[Garment, ...] = ()
-    compare: bool = False
-    sheet: Path | None = None
-    force: bool = False
-    workers: int | None = None
-    compile: bool | None = None
+    source: Path = option(
+        "--source", "Source", "Photo of the person.", kind="path", default=REQUIRED
+    )
+    source_iuv: Path | None = option(
+        "--source-iuv",
+        "Source",
+        "Its IUV; else STEM_IUV.png or STEM_iuv.png beside it.",
+        kind="path",
+    )
+    person: str = option(
+        "--person",
+        "Source",
+        "largest (default), an index from the left (0 first), or a box x0,y0,x1,y1 in pixels.",
+        default="largest",
+        metavar="WHO",
+    )
+    source_iuv_order: ChannelOrder | None = option(
+        "--source-iuv-order",
+        "Source",
+        "As --iuv-order, for source and garments.",
+        choices=CHANNEL_ORDERS,
+        metavar="ORDER",
+    )
+    driver: Path = option(
+        "--driver",
+        "Driver",
+        "Folder of IUV images, one IUV image, lossless IUV video, .npy, .npz, detectron2's"
+        " results.pkl, or people:MOTION (such as people:walk,frames=60; see `mt people drive -h`).",
+        kind="path",
+        default=REQUIRED,
+    )
+    driver_person: str = option(
+        "--driver-person",
+        "Driver",
+        "Whom to follow; as --person.",
+        default="largest",
+        metavar="WHO",
+    )
+    iuv_order: ChannelOrder | None = option(
+        "--iuv-order",
+        "Driver",
+        "Channels of the file's RGB: iuv, or vui as Caffe2's DensePose has it; else found out.",
+        choices=CHANNEL_ORDERS,
+        metavar="ORDER",
+    )
+    missing: Missing | None = option(
+        "--missing",
+        "Driver",
+        "Frames that show nobody, and numbers missing in a folder: hold (repeat the frame before),"
+        " background, or fail. Default: background for the former, fail for the latter.",
+        choices=MISSING,
+    )
+    frames: tuple[int | None, int | None] = option(
+        "--frames",
+        "Driver",
+        "Only these frames, counted from 0, B excluded.",
+        kind="frames",
+        default=(None, None),
+        metavar="A:B",
+    )
+    garments: tuple[Garment, ...] = option(
+        "--garment --garment-parts",
+        "Garment transfer",
+        "Take parts from this photo; may be repeated, each with its --garment-parts.",
+        kind="garments",
+        default=(),
+    )
+    renderer: str | None = option(
+        "--renderer",
+        "Rendering",
+        "texture (a draft, no weights; default) or nhrr (the network; default with --weights).",
+        choices=RENDERERS,
+        metavar="NAME",
+    )
+    weights: Path | None = option(
+        "--weights", "Rendering", "Checkpoint for nhrr, safetensors.", kind="path"
+    )
+    background: str = option(
+        "--background",
+        "Rendering",
+        "white (default), black, #rrggbb, or photo (the source's, without the person).",
+        default="white",
+        metavar="COLOUR",
+    )
+    workers: int | None = option(
+        "--workers",
+        "Rendering",
+        "Threads; default: one for each core.",
+        kind="integer",
+        in_manifest=False,
+    )
+    compile: bool | None = option(
+        "--compile/--no-compile",
+        "Rendering",
+        "Compile the network first; default: for drivers of 300 frames and more.",
+        kind="switch",
+    )
+    output: Path = option(
+        "-o --output",
+        "Output",
+        ".mp4 .mov .mkv .webm .gif, .png for one frame, or a folder of PNG.",
+        kind="path",
+        default=REQUIRED,
+    )
+    frame_rate: Fraction | None = option(
+        "--fps",
+        "Output",
+        "Such as 25 or 30000/1001; default: the driver's, or 30.",
+        kind="rate",
+        metavar="RATE",
+    )
+    codec: str | None = option(
+        "--codec", "Output", "h264, h265, vp9, av1, ffv1; default by container.", metavar="NAME"
+    )
+    crf: int | None = option(
+        "--crf",
+        "Output",
+        "Quality, lower is better; default by codec, 18 for h264.",
+        kind="integer",
+    )
+    audio: Path | None = option(
+        "--audio",
+        "Output",
+        "Sound from this file, or none; default: the driver video's own.",
+        kind="path",
+        metavar="FILE|none",
+    )
+    size: str = option(
+        "--size",
+        "Output",
+        "The driver's frame (default), the square around the person, or the frame made even.",
+        default="driver",
+        choices=SIZES,
+    )
+    compare: bool = option(
+        "--compare", "Output", "Source, IUV and result side by side.", kind="flag", default=False
+    )
+    sheet: Path | None = option(
+        "--sheet", "Output", "Write a contact sheet (PNG) there as well.", kind="path"
+    )
+    force: bool = option(
+        "--force", "Output", "Replace an existing output.", kind="flag", default=False
+    )
+    restart: bool = option(
+        "--restart",
+        "Output",
+        "Begin anew, whatever an interrupted run of the same output has finished.",
+        kind="flag",
+        default=False,
+        in_manifest=False,
+    )
 
     def __post_init__(self) -> None:
-        for name, allowed in (
-            ("renderer", (None, *RENDERERS)),
-            ("iuv_order", (None, *CHANNEL_ORDERS)),
-            ("source_iuv_order", (None, *CHANNEL_ORDERS)),
-            ("missing", (None, *get_args(Missing))),
-            ("size", SIZES),
-        ):
-            if getattr(self, name) not in allowed:
-                listed = ", ".join(word for word in allowed if word)
-                raise InputError(f"{name} is {getattr(self, name)!r}; supported are {listed}")
+        for entry in list_options(RenderOptions):
+            value = getattr(self, entry.name)
+            if entry.choices and value != entry.default and value not in entry.choices:
+                listed = ", ".join(entry.choices)
+                raise InputError(f"{entry.name} is {value!r}; supported are {listed}")
         if self.renderer == "nhrr" and self.weights is None:
             raise InputError("the nhrr renderer needs --weights FILE; none ship yet")
         if self.renderer == "texture" and self.weights is not None:
@@ -131,15 +242,20 @@ def parse_colour(background: str) -> tuple[int, int, int] | None:
 
 def parse_frames(text: str) -> tuple[int | None, int | None]:
     """`10:50`, `10:`, `:50` or `12` as a half-open range. Raises: InputError."""
+    return parse_range(text, "frames")
+
+
+def parse_range(text: str, what: str) -> tuple[int | None, int | None]:
+    """A half-open range of what is counted from 0, either end open. Raises: InputError."""
     try:
         if ":" not in text:
             return int(text), int(text) + 1
         start, stop = text.split(":")
         ends = int(start) if start else None, int(stop) if stop else None
     except ValueError:
-        raise InputError(f"frames {text!r}; write START:STOP, such as 10:50, 10: or :50") from None
+        raise InputError(f"{what} {text!r}; write START:STOP, such as 10:50, 10: or :50") from None
     if any(end is not None and end < 0 for end in ends):
-        raise InputError(f"frames {text!r}; frames count from 0 and never from the end")
+        raise InputError(f"{what} {text!r}; {what} count from 0 and never from the end")
     return ends
 
 
@@ -162,6 +278,8 @@ def parse_rate(text: str) -> Fraction:
 
 def parse_parts(text: str) -> tuple[int, ...]:
     """Part numbers of a comma-separated list of part or group names. Raises: InputError."""
+    from nhrr_core.iuv import PART_GROUPS, PART_NAMES
+
     names = {name: (index,) for index, name in enumerate(PART_NAMES) if index}
     names |= PART_GROUPS
     parts: set[int] = set()
@@ -175,3 +293,38 @@ def parse_parts(text: str) -> tuple[int, ...]:
     if not parts:
         raise InputError("no parts named; write some, such as torso,upper-legs")
     return tuple(sorted(parts))
+
+
+def parse_word(entry: Option, value: Any) -> Any:
+    """A value as the command line or a manifest writes it, as the field of `RenderOptions`.
+
+    Garments are mappings with `photo`, `parts` and, if wanted, `iuv`. Raises: InputError.
+    """
+    if value is None:
+        return entry.default
+    if entry.kind == "path":
+        return Path(value)
+    if entry.kind == "rate":
+        return parse_rate(str(value))
+    if entry.kind == "frames":
+        return parse_frames(str(value))
+    if entry.kind == "garments":
+        return tuple(
+            Garment(
+                photo=Path(garment["photo"]),
+                iuv=Path(garment["iuv"]) if garment.get("iuv") else None,
+                parts=parse_parts(garment["parts"]),
+            )
+            for garment in value
+        )
+    if entry.name == "background":
+        parse_colour(value)
+    return value
+
+
+def options_from_words(words: Mapping[str, Any]) -> RenderOptions:
+    """Options from what was written, by field name. Raises: InputError for a value that is none."""
+    entries = {entry.name: entry for entry in list_options(RenderOptions)}
+    return RenderOptions(
+        **{name: parse_word(entries[name], value) for name, value in words.items()}
+    )

@@ -15,6 +15,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.image import Photo, read_photo
 from motion_transfer.media.iuv_image import ChannelOrder
 from motion_transfer.media.iuv_stream import read_single_iuv
+from motion_transfer.render.beside import find_iuv_beside
 from motion_transfer.render.options import Garment, RenderOptions
 from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
@@ -69,25 +70,6 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
             " use a larger photo, or choose another --person"
         )
     return Source(photo, iuv, iuv_path, texture, visibility)
-
-
-def list_iuv_names(photo: Path) -> list[Path]:
-    """Where a photo's IUV is looked for: `<stem>_IUV.png` and `<stem>_iuv.png` next to it."""
-    return [photo.with_name(f"{photo.stem}_{word}.png") for word in ("IUV", "iuv")]
-
-
-def find_iuv_beside(photo: Path) -> Path:
-    """`<stem>_IUV.png` or `<stem>_iuv.png` next to a photo. Raises: InputError if neither is."""
-    if not photo.exists():
-        raise InputError(f"source {photo} does not exist")
-    candidates = list_iuv_names(photo)
-    for candidate in candidates:
-        if candidate.exists():
-            return candidate
-    raise InputError(
-        f"no IUV found for {photo}: neither {candidates[0].name} nor {candidates[1].name} is beside"
-        " it; make one with DensePose and name it with --source-iuv"
-    )
 
 
 def unfold(

@@ -27,15 +27,7 @@ class TextureRenderer:
     batch_size = 1
     takes_turns = False
 
-    def __init__(self, source: Source) -> None:
-        layout = load_uv_layout()
-        texture = complete_texture(source.texture, source.visibility, layout)
-        v, u = np.mgrid[:CHART_SIZE, :CHART_SIZE].astype(np.uint8)
-        codes = np.stack([np.stack([np.full_like(u, i), u, v]) for i in range(PART_COUNT + 1)])
-        colours = sample_features(texture, torch.from_numpy(codes), layout.charts)
-        table = np.zeros((PART_COUNT + 1, CHART_SIZE, CHART_SIZE, 4), np.uint8)
-        table[..., :3] = ((colours + 1) * 127.5).round().clamp(0, 255).permute(0, 2, 3, 1).numpy()
-        table[1:, ..., 3] = 255
+    def __init__(self, table: UInt8[np.ndarray, "25 256 256 4"]) -> None:
         self._table = table.view(np.uint32).reshape(-1)
 
     def working_size(self, window_side: int) -> int:
@@ -49,6 +41,19 @@ class TextureRenderer:
         rgba = self._table.take(index).view(np.uint8).reshape(*iuv.shape[:2], 4)
         rgba[..., 3] = soften(rgba[..., 3])
         return rgba
+
+
+def tabulate_texture(source: Source) -> UInt8[np.ndarray, "25 256 256 4"]:
+    """RGB of every (I, V, U) of a source's completed texture, and coverage: 0 for part 0."""
+    layout = load_uv_layout()
+    texture = complete_texture(source.texture, source.visibility, layout)
+    v, u = np.mgrid[:CHART_SIZE, :CHART_SIZE].astype(np.uint8)
+    codes = np.stack([np.stack([np.full_like(u, i), u, v]) for i in range(PART_COUNT + 1)])
+    colours = sample_features(texture, torch.from_numpy(codes), layout.charts)
+    table = np.zeros((PART_COUNT + 1, CHART_SIZE, CHART_SIZE, 4), np.uint8)
+    table[..., :3] = ((colours + 1) * 127.5).round().clamp(0, 255).permute(0, 2, 3, 1).numpy()
+    table[1:, ..., 3] = 255
+    return table
 
 
 CODE_WEIGHTS = np.array([[CHART_SIZE**2, 1, CHART_SIZE]], np.float32)

@@ -13,7 +13,8 @@ from jaxtyping import UInt8
 from motion_transfer.errors import InputError
 from motion_transfer.media.image import Photo, read_photo
 from motion_transfer.media.iuv_image import ChannelOrder
-from motion_transfer.render.source import list_iuv_names, read_person
+from motion_transfer.render.beside import list_iuv_names
+from motion_transfer.render.source import read_person
 
 
 @dataclass(frozen=True)

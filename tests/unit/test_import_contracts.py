@@ -50,6 +50,8 @@ def test_the_contracts_hold(copy: Path) -> None:
         ("motion_transfer/evaluation/sheet.py", "import PIL.Image"),
         ("motion_transfer/errors.py", "import motion_transfer.media.image"),
         ("motion_transfer/training/step.py", "import accelerate"),
+        ("motion_transfer/batch/schedule.py", "import ray"),
+        ("motion_transfer/render/content.py", "import motion_transfer.batch.run"),
         ("motion_transfer/cli/run.py", "import av"),
         ("motion_transfer/render/sheet.py", "import PIL.Image"),
         ("nhrr_core/texture.py", "import numpy"),

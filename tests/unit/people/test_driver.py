@@ -16,8 +16,9 @@ from motion_transfer.media.iuv_stream import open_reader, open_stream
 from motion_transfer.people.driver import MotionDriver, MotionOptions
 from motion_transfer.people.figure.body import Shape
 from motion_transfer.people.motion.motions import MOTIONS
+from motion_transfer.people.motion_name import is_motion
 from motion_transfer.people.recording import record_motion
-from motion_transfer.people.stream import is_motion, open_motion
+from motion_transfer.people.stream import open_motion
 
 
 @pytest.fixture

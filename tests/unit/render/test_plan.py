@@ -14,15 +14,30 @@ from motion_transfer.render.plan import (
     CHUNK_FRAMES,
     DriverPlan,
     frame_range,
-    plan_driver,
+    plan_path,
+    scan_people,
 )
 from motion_transfer.render.window import Window
 
 
 def plan(studio, iuvs: np.ndarray, **changes) -> DriverPlan:
     settings = {"frames": (None, None), "person": "largest", "workers": 2, "done": lambda _: None}
+    settings |= changes
     reader = open_reader(open_stream(studio.array(iuvs)))
-    return plan_driver(reader, frame_rate=Fraction(25), **{**settings, **changes})
+    name = str(reader.stream.path)
+    chosen = frame_range(settings["frames"], reader.stream.frame_count, name)
+    seen = scan_people(reader, chosen, settings["workers"], settings["done"])
+    found = next((i for i, frame in enumerate(seen) if frame.people.persons), 0)
+    return plan_path(
+        seen,
+        chosen=chosen,
+        frame_rate=Fraction(25),
+        person=settings["person"],
+        where=name,
+        where_first=reader.stream.where(chosen.start),
+        where_found=reader.stream.where(chosen.start + found),
+        missing=settings.get("missing"),
+    )
 
 
 @pytest.mark.parametrize(
@@ -96,6 +111,7 @@ def test_held_frames_show_the_last_one_with_somebody(studio) -> None:
     planned = plan(studio, frames, missing="hold")
     assert [frame.held for frame in planned.frames] == [2, 2, None, None, 3, 3, None, None, 7]
     assert planned.frames[4].person == planned.frames[3].person
+    assert planned.frames[4].digest == planned.frames[3].digest
     assert planned.missing == [(0, 2), (4, 6), (8, 9)]
 
 

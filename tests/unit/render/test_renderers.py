@@ -7,11 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motion_transfer.render.neural_renderer import NeuralRenderer, grow_mask
+from motion_transfer.render.neural_renderer import (
+    NeuralRenderer,
+    PreparedNetwork,
+    encode_source,
+    grow_mask,
+)
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.source import Source, prepare_source
-from motion_transfer.render.texture_renderer import TextureRenderer, soften
+from motion_transfer.render.texture_renderer import TextureRenderer, soften, tabulate_texture
 from motion_transfer.weights import load_checkpoint
 
 
@@ -24,8 +29,9 @@ def source(studio) -> Source:
 @pytest.fixture(params=["texture", "nhrr"])
 def renderer(request, source: Source, checkpoint: Path) -> Renderer:
     if request.param == "texture":
-        return TextureRenderer(source)
-    return NeuralRenderer(load_checkpoint(checkpoint), source, compile=False)
+        return TextureRenderer(tabulate_texture(source))
+    model = load_checkpoint(checkpoint)
+    return NeuralRenderer(PreparedNetwork(model, compile=False), encode_source(model, source))
 
 
 def crops(studio, renderer: Renderer) -> np.ndarray:
@@ -50,7 +56,7 @@ def test_a_renderer_repeats_itself(studio, renderer: Renderer) -> None:
 
 def test_the_texture_renderer_looks_colours_up(studio, source: Source) -> None:
     iuv = studio.iuv(0, 0, size=(96, 96))
-    rgba = TextureRenderer(source).render(iuv[None])[0]
+    rgba = TextureRenderer(tabulate_texture(source)).render(iuv[None])[0]
     for part, colour in {2: (200, 40, 40), 9: (30, 60, 160), 23: (220, 180, 40)}.items():
         middle = np.median(rgba[iuv[..., 0] == part][:, :3], axis=0)
         np.testing.assert_allclose(middle, colour, atol=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,8 @@ from motion_transfer.render.sheet import SHEET_FRAMES, ContactSheet
 
 
 @pytest.mark.parametrize("count", [1, 3, 12, 100])
-def test_frames_are_spread_and_in_order(count: int) -> None:
-    sheet = ContactSheet(count)
+def test_frames_are_spread_and_in_order(tmp_path: Path, count: int) -> None:
+    sheet = ContactSheet(tmp_path, count)
     for index in reversed(range(count)):
         sheet.offer(index, np.full((8, 10, 3), 2 * index, np.uint8))
     picture = sheet.picture()
@@ -22,7 +24,7 @@ def test_frames_are_spread_and_in_order(count: int) -> None:
     np.testing.assert_array_equal(levels, expected)
 
 
-def test_large_frames_become_thumbnails() -> None:
-    sheet = ContactSheet(1)
+def test_large_frames_become_thumbnails(tmp_path: Path) -> None:
+    sheet = ContactSheet(tmp_path, 1)
     sheet.offer(0, np.zeros((640, 960, 3), np.uint8))
     assert sheet.picture().shape == (213, 320, 3)

@@ -1,0 +1,1 @@
+"""Manifests of many runs: read, schedule over workers, resume, report."""

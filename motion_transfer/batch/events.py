@@ -1,0 +1,90 @@
+"""What a batch says while it works."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class BatchStarted:
+    """Jobs were read."""
+
+    job_count: int
+    workers: int
+
+
+@dataclass(frozen=True)
+class JobPlanned:
+    """A job's frames are known; `done_count` of them were finished by an earlier run."""
+
+    name: str
+    frame_count: int
+    done_count: int
+
+
+@dataclass(frozen=True)
+class JobFrames:
+    """So many more frames of a job are done."""
+
+    name: str
+    frame_count: int
+
+
+@dataclass(frozen=True)
+class JobNotice:
+    """Something the user should know of a job, though the work goes on."""
+
+    name: str
+    message: str
+
+
+@dataclass(frozen=True)
+class JobDone:
+    """A job's output has its final name."""
+
+    name: str
+    output: Path
+    frame_count: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class JobFailed:
+    """A job will not be done in this run."""
+
+    name: str
+    message: str
+
+
+@dataclass(frozen=True)
+class BatchStopping:
+    """A first Ctrl-C: running chunks are finished, nothing new begins."""
+
+    running_count: int
+
+
+@dataclass(frozen=True)
+class BatchFinished:
+    """Nothing is running any more. `left_count` jobs were not begun or not finished."""
+
+    done_count: int
+    current_count: int
+    failed_count: int
+    left_count: int
+    seconds: float
+    feature_maps: int
+
+
+BatchEvent = (
+    BatchStarted
+    | JobPlanned
+    | JobFrames
+    | JobNotice
+    | JobDone
+    | JobFailed
+    | BatchStopping
+    | BatchFinished
+)
+BatchListener = Callable[[BatchEvent], None]

@@ -1,0 +1,187 @@
+"""A whole batch, from a manifest to a report: what `mt batch` calls."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from motion_transfer.batch.events import BatchFinished, BatchListener, BatchStarted
+from motion_transfer.batch.expand import Job, check_inputs, expand
+from motion_transfer.batch.manifest import Manifest
+from motion_transfer.batch.manifest_file import ManifestError, read_manifest
+from motion_transfer.batch.report import write_report
+from motion_transfer.batch.schedule import Scheduler, Tally
+from motion_transfer.batch.state import BatchState
+from motion_transfer.batch.workers import LocalWorkers, Workers
+from motion_transfer.errors import InputError
+
+ENGINES = ("local", "ray")
+MOST_PROBLEMS = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchOptions:
+    """How a manifest is run.
+
+    Attributes:
+        settings: `key=value`, over the manifest's fields or every job's options.
+        chosen: half-open range of jobs, either end open.
+        workers: processes; None: one for each GPU, or for each core.
+        engine: `local`, or `ray` with the `cluster` extra.
+        address: of the Ray cluster; `auto` finds one, None starts one on this machine.
+        keep_going: a failed job does not stop the others.
+        restart: forget what earlier runs finished.
+    """
+
+    manifest: Path
+    settings: Sequence[str] = ()
+    chosen: tuple[int | None, int | None] = (None, None)
+    workers: int | None = None
+    engine: str = "local"
+    address: str | None = None
+    keep_going: bool = True
+    restart: bool = False
+
+    def __post_init__(self) -> None:
+        if self.engine not in ENGINES:
+            raise InputError(f"engine {self.engine!r}; supported are {', '.join(ENGINES)}")
+        if self.workers is not None and self.workers < 1:
+            raise InputError(f"workers is {self.workers}; it must be at least 1")
+        if self.address is not None and self.engine != "ray":
+            raise InputError("--address is of a Ray cluster; add --engine ray")
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A manifest that was read."""
+
+    manifest: Manifest
+    jobs: list[Job]
+    state: BatchState
+    output_root: Path
+    path: Path
+
+    @property
+    def report_folder(self) -> Path:
+        return self.output_root / f"{self.path.stem}.report"
+
+
+def read_batch(path: Path, settings: Sequence[str] = ()) -> Batch:
+    """Read a manifest and lay out its jobs. Raises: ManifestError."""
+    manifest, text = read_manifest(path, settings)
+    root = path.absolute().parent / manifest.output_root
+    return Batch(manifest, expand(manifest, text), BatchState(path, root), root, path)
+
+
+def validate(batch: Batch) -> None:
+    """Raises: ManifestError naming the inputs that are missing."""
+    problems = list(check_inputs(batch.jobs))
+    if problems:
+        more = [f"and {len(problems) - MOST_PROBLEMS} more"] * (len(problems) > MOST_PROBLEMS)
+        lines = [f"{batch.path}: {words}" for words in problems[:MOST_PROBLEMS]]
+        raise ManifestError("\n".join(lines + more))
+
+
+def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
+    """Run a manifest's jobs; those that are done and unchanged are left alone.
+
+    Raises: ManifestError; OutputError if somebody else is at work on it; KeyboardInterrupt after
+        a Ctrl-C, with everything finished kept.
+    """
+    began = time.monotonic()
+    batch = read_batch(options.manifest, options.settings)
+    jobs = _choose(batch.jobs, options)
+    with batch.state.held():
+        if options.restart:
+            batch.state.forget()
+        workers = _open_workers(options, batch.state.scratch)
+        scheduler = Scheduler(
+            jobs,
+            workers,
+            batch.state,
+            retries=batch.manifest.retries,
+            keep_going=options.keep_going,
+            restart=options.restart,
+            listener=listener,
+        )
+        listener(BatchStarted(len(jobs), workers.count))
+        with _interrupts(scheduler) as interrupts:
+            try:
+                tally = scheduler.run()
+            except BaseException:
+                workers.stop(now=True)
+                raise
+            workers.stop(now=False)
+        write_report(batch.report_folder, batch.jobs, batch.state)
+    listener(
+        BatchFinished(
+            *(tally.done, tally.current, tally.failed, tally.left),
+            time.monotonic() - began,
+            scheduler.feature_maps,
+        )
+    )
+    if interrupts:
+        raise KeyboardInterrupt
+    return tally
+
+
+def status(batch: Batch) -> dict[str, int]:
+    """How many jobs are done, failed and not begun, as far as was noted."""
+    counts = {"done": 0, "failed": 0, "to do": 0}
+    for job in batch.jobs:
+        record = batch.state.records.get(str(job.options.output), {})
+        counts[record.get("status", "to do")] += 1
+    return counts
+
+
+def _choose(jobs: list[Job], options: BatchOptions) -> list[Job]:
+    start, stop = options.chosen
+    chosen = jobs[slice(start, stop)]
+    if not chosen:
+        raise InputError(
+            f"jobs {start or 0}:{len(jobs) if stop is None else stop} asked for, but"
+            f" {options.manifest} has {len(jobs)}: 0:{len(jobs)} at most"
+        )
+    return chosen
+
+
+def _open_workers(options: BatchOptions, scratch: Path) -> Workers:
+    if options.engine == "ray":
+        from motion_transfer.batch.ray_workers import RayWorkers
+
+        return RayWorkers(options.workers, options.address)
+    return LocalWorkers(options.workers or _default_count(), scratch)
+
+
+def _default_count() -> int:
+    """One worker a GPU, as the driver lists them; else one a core."""
+    gpus = len(list(Path("/proc/driver/nvidia/gpus").glob("*")))
+    return gpus or len(os.sched_getaffinity(0))
+
+
+@contextmanager
+def _interrupts(scheduler: Scheduler) -> Iterator[list[Any]]:
+    """The first Ctrl-C lets running chunks finish, the second stops now."""
+    heard: list[Any] = []
+
+    def hear(number: int, _frame: Any) -> None:
+        heard.append(number)
+        if len(heard) > 1:
+            raise KeyboardInterrupt
+        scheduler.halt()
+
+    if threading.current_thread() is not threading.main_thread():
+        yield heard
+        return
+    before = signal.signal(signal.SIGINT, hear)
+    try:
+        yield heard
+    finally:
+        signal.signal(signal.SIGINT, before)

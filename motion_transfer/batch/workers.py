@@ -1,0 +1,118 @@
+"""Workers on this machine: a process each, so that one that dies takes nobody with it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Any, Protocol
+
+from motion_transfer.batch.tasks import Fetch
+
+ORPHANED = 3  # exit code of a worker whose scheduler is gone
+
+
+class Workers(Protocol):
+    """A fixed number of places where tasks run, one at a time in each.
+
+    Attributes:
+        count: of places.
+        lost_error: what a future raises whose worker died.
+    """
+
+    count: int
+    lost_error: tuple[type[BaseException], ...]
+
+    def submit(self, place: int, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Run a task in a place, in a fresh worker if the last one there died."""
+        ...
+
+    def share(self, name: str, blob: bytes) -> Fetch:
+        """Make a blob available to every worker; the result can be an argument of a task."""
+        ...
+
+    def forget(self, name: str) -> None:
+        """Nobody needs a blob any more."""
+        ...
+
+    def stop(self, *, now: bool) -> None:
+        """End the workers; `now` without waiting for what they do."""
+        ...
+
+
+class LocalWorkers:
+    """Processes of this machine; blobs go through files."""
+
+    lost_error: tuple[type[BaseException], ...] = (BrokenProcessPool,)
+
+    def __init__(self, count: int, scratch: Path) -> None:
+        """Args: scratch, an own folder for blobs, emptied here and removed by `stop`."""
+        self.count = count
+        self._scratch = scratch
+        shutil.rmtree(scratch, ignore_errors=True)
+        scratch.mkdir(parents=True, mode=0o700)
+        self._pools: list[ProcessPoolExecutor | None] = [None] * count
+
+    def submit(self, place: int, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        pool = self._pools[place]
+        if pool is not None:
+            try:
+                return pool.submit(task, *arguments)
+            except BrokenProcessPool:
+                pool.shutdown(wait=False)
+        pool = self._pools[place] = ProcessPoolExecutor(
+            1,
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=begin_worker,
+            initargs=(place, self.count, sys.path),
+        )
+        return pool.submit(task, *arguments)
+
+    def share(self, name: str, blob: bytes) -> Fetch:
+        path = self._scratch / name
+        path.write_bytes(blob)
+        return partial(Path.read_bytes, path)
+
+    def forget(self, name: str) -> None:
+        (self._scratch / name).unlink(missing_ok=True)
+
+    def stop(self, *, now: bool) -> None:
+        for pool in filter(None, self._pools):
+            if now:
+                for process in list((pool._processes or {}).values()):
+                    process.kill()
+            pool.shutdown(wait=True, cancel_futures=True)
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
+
+def begin_worker(place: int, count: int, path: list[str]) -> None:
+    """Settle into a worker process: its share of the cores, its GPU, nobody's orphan."""
+    sys.path[:] = path
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the scheduler's to hear
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    import cv2
+    import torch
+
+    if torch.cuda.is_available():
+        torch.cuda.set_device(place % torch.cuda.device_count())
+    threads = max(1, len(os.sched_getaffinity(0)) // count)
+    torch.set_num_threads(threads)
+    cv2.setNumThreads(threads)
+
+
+def _follow_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(ORPHANED)

@@ -1,0 +1,208 @@
+"""The work folder of an output: finished pieces, their journal, and a lock.
+
+It lies beside the output, hidden, on the same file system, under a name that follows from the
+output's: whoever makes the same output again finds what an interrupted run has finished. A piece is
+published by writing it under another name, syncing, renaming, and only then noting it in the
+journal, with a key of the content it was made from. The operating system releases the lock of a
+process that dies, so a lock that is held has a living owner.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import socket
+import threading
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from filelock import FileLock, Timeout
+
+from motion_transfer.errors import OutputError
+from motion_transfer.media.journal import Journal
+from motion_transfer.media.publish import explain_disk_errors, publish
+
+READ_BYTES = 1 << 20
+
+
+def work_path(final: Path) -> Path:
+    """Where the work folder of an output lies."""
+    return final.absolute().with_name(f".{final.name}.work")
+
+
+@contextmanager
+def locked(folder: Path, what: str) -> Iterator[None]:
+    """Hold an existing folder's lock. Raises: OutputError naming who holds it already.
+
+    Args:
+        what: begins the message, such as `cannot write out.mp4`.
+    """
+    owner = folder / "owner.json"
+    lock = FileLock(folder / "lock", timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        try:
+            who = json.loads(owner.read_text())
+            words = f"process {who['process']} on {who['host']}"
+        except (OSError, ValueError, KeyError, TypeError):
+            words = "another process"
+        raise OutputError(f"{what}: {words} is at work on it; wait for it, or stop it") from None
+    try:
+        owner.write_text(json.dumps({"process": os.getpid(), "host": socket.gethostname()}))
+        yield
+    finally:
+        lock.release()
+
+
+class WorkFolder:
+    """A context manager: inside it, this process alone works on an output.
+
+    What was finished stays for the next run unless `clear` was called; a folder in which nothing
+    was finished goes, and so do the folders that were made to hold it.
+    """
+
+    def __init__(self, final: Path, *, restart: bool = False) -> None:
+        self.path = work_path(final)
+        self._final = final
+        self._restart = restart
+        self._made: list[Path] = []
+        self._journal = Journal(self.path / "journal.jsonl")
+        self._pieces: dict[str, dict[str, Any]] = {}
+        self._writing = threading.Lock()
+
+    def __enter__(self) -> Self:
+        """Raises: OutputError if somebody else works there, or it cannot be written."""
+        with explain_disk_errors(self._final):
+            for folder in self.path.parents:
+                if folder.exists():
+                    break
+                self._made.append(folder)
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = locked(self.path, f"cannot write {self._final}")
+            self._lock.__enter__()
+            if self._restart:
+                self._remove_content()
+            self._pieces = {entry["piece"]: entry for entry in self._journal.repair()}
+            for stray in self.path.glob("*.part-*"):
+                _remove(stray)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if not self._pieces:
+            self.clear()
+        self._lock.__exit__(None, None, None)
+
+    def clear(self) -> None:
+        """Remove the folder: the output is published, or there is nothing to keep."""
+        shutil.rmtree(self.path, ignore_errors=True)
+        self._pieces = {}
+        if not self._final.exists():
+            for folder in self._made:
+                try:
+                    folder.rmdir()
+                except OSError:  # somebody else put something there meanwhile: theirs to keep
+                    break
+
+    def has(self, piece: str, key: str) -> bool:
+        """Whether a piece is there, whole, and made from content with that key."""
+        entry = self._pieces.get(piece)
+        if entry is None or entry["key"] != key:
+            return False
+        path = self.path / piece
+        try:
+            return path.exists() and digest_of(path) == entry["sha256"]
+        except OSError:
+            return False
+
+    def temporary(self, piece: str) -> Path:
+        """A name to write a piece under before `finish`; never the same twice."""
+        path = Path(piece)
+        return self.path / f"{path.stem}.part-{uuid.uuid4().hex[:8]}{path.suffix}"
+
+    def finish(self, piece: str, written: Path, key: str) -> None:
+        """Give a written piece its name and note it; on return both are on disk."""
+        self.note(piece, publish_piece(written, self.path / piece), key)
+
+    def note(self, piece: str, digest: str, key: str) -> None:
+        """Note a piece that has its name already (see `publish_piece`)."""
+        entry = {"piece": piece, "key": key, "sha256": digest}
+        with self._writing:
+            self._journal.append(entry)
+            self._pieces[piece] = entry
+
+    def publish(self, finished: Path, key: str) -> None:
+        """Move a finished output onto its final name. Killed at any moment, `published` knows."""
+        entry = {"piece": "output", "key": key, "sha256": _identity(finished)}
+        self._journal.append(entry)
+        publish(finished, self._final)
+
+    def published(self, key: str | None = None) -> bool:
+        """Whether the file under the final name is the one that `publish` put there."""
+        entry = self._pieces.get("output")
+        if entry is None or not self._final.exists() or key not in (None, entry["key"]):
+            return False
+        return _identity(self._final) == entry["sha256"]
+
+    def _remove_content(self) -> None:
+        for item in self.path.iterdir():
+            if item.name not in ("lock", "owner.json"):
+                _remove(item)
+
+
+def was_published(final: Path) -> bool:
+    """Whether an output's run was stopped after publishing it, before it could clear its folder."""
+    entries = Journal(work_path(final) / "journal.jsonl").read()
+    output = [entry["sha256"] for entry in entries if entry["piece"] == "output"]
+    return bool(output) and final.exists() and _identity(final) == output[-1]
+
+
+def publish_piece(written: Path, final: Path) -> str:
+    """Sync a file or folder of files and give it its name; its digest. Raises: OSError."""
+    digest = digest_of(written)
+    if final.is_dir():
+        shutil.rmtree(final)
+    publish(written, final)
+    return digest
+
+
+def key_of(facts: Mapping[str, Any]) -> str:
+    """A digest of facts that JSON can hold; paths and fractions as words."""
+    return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of a file, or of a folder's files and their names; hexadecimal. Raises: OSError."""
+    digest = hashlib.sha256()
+    files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+    for file in files:
+        if path.is_dir():
+            digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
+        with file.open("rb") as stream:
+            while block := stream.read(READ_BYTES):
+                digest.update(block)
+    return digest.hexdigest()
+
+
+def _identity(path: Path) -> str:
+    """What a rename leaves as it is, and nothing else does."""
+    status = path.stat()
+    return f"{status.st_ino}:{status.st_mtime_ns}:{0 if path.is_dir() else status.st_size}"
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink()

@@ -1,0 +1,218 @@
+"""Everything a run needs before its first frame: the plan, the source's appearance, the canvas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from motion_transfer.errors import OutputError
+from motion_transfer.media.audio import AudioCut, choose_audio
+from motion_transfer.media.formats import OutputFormat
+from motion_transfer.media.iuv_image import ChannelOrder
+from motion_transfer.media.iuv_stream import IuvReader, Missing, list_gaps, open_reader, open_stream
+from motion_transfer.media.stream import IuvStream
+from motion_transfer.people.motion_name import is_motion
+from motion_transfer.render.canvas import Canvas
+from motion_transfer.render.compose import Comparison, make_background
+from motion_transfer.render.content import chunk_key, digest_file, run_key, source_key
+from motion_transfer.render.events import FramesDone, Listener, Notice, Stage
+from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
+from motion_transfer.render.plan import (
+    DriverPlan,
+    SeenFrame,
+    frame_range,
+    plan_path,
+    scan_people,
+)
+from motion_transfer.render.recipe import Recipe, choose_recipe
+from motion_transfer.render.source import Source
+
+
+@dataclass(frozen=True)
+class DriverFile:
+    """A driver that any process can open for itself.
+
+    Attributes:
+        missing: what a number missing from a folder does.
+    """
+
+    path: Path
+    missing: Missing
+    order: ChannelOrder
+
+    def open(self) -> IuvReader:
+        """Raises: InputError if it is gone, IuvFileError if it is not IUV."""
+        return open_reader(_open_stream(self.path, self.missing), self.order)
+
+
+@dataclass(frozen=True)
+class DriverScan:
+    """One look at a driver, which any number of runs may share.
+
+    Attributes:
+        chosen: the frames that were looked at, `seen` one for each.
+        frame_rate: the driver's own, if it has one.
+        where_first, where_found: the first of the frames, and the first of them with somebody (if
+            there is one), for messages.
+    """
+
+    file: DriverFile
+    height: int
+    width: int
+    frame_rate: Fraction | None
+    chosen: range
+    seen: list[SeenFrame]
+    where_first: str
+    where_found: str
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A run that can be rendered chunk by chunk, in any process.
+
+    Attributes:
+        chunk_keys: of the content that each chunk is made from.
+    """
+
+    driver: DriverFile
+    plan: DriverPlan
+    recipe: Recipe
+    canvas: Canvas
+    output_format: OutputFormat
+    audio: AudioCut | None
+    chunk_keys: tuple[str, ...]
+
+
+def scan_driver(options: RenderOptions, listener: Listener) -> DriverScan:
+    """Decode a driver once. Raises: InputError; IuvFileError naming the frame that is broken."""
+    if is_motion(options.driver):
+        from motion_transfer.people.figure.body import FIRST_USE, is_cached
+
+        if not is_cached():
+            listener(Notice(FIRST_USE))
+    missing = options.missing or "fail"
+    stream = _open_stream(options.driver, missing)
+    if stream.gaps:
+        filled = "shows nobody" if missing == "background" else "repeats the frame before it"
+        listener(Notice(f"{list_gaps(stream.gaps)}; each {filled}"))
+    for note in stream.notes:
+        listener(Notice(note))
+    reader = open_reader(stream, options.iuv_order)
+    chosen = frame_range(options.frames, stream.frame_count, str(options.driver))
+    listener(Stage("scan", len(chosen)))
+    seen = scan_people(
+        reader, chosen, options.worker_count, lambda count: listener(FramesDone(count))
+    )
+    found = next((i for i, frame in enumerate(seen) if frame.people.persons), 0)
+    return DriverScan(
+        DriverFile(options.driver, missing, reader.order),
+        reader.height,
+        reader.width,
+        stream.frame_rate,
+        chosen,
+        seen,
+        stream.where(chosen.start),
+        stream.where(chosen.start + found),
+    )
+
+
+def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
+    """Whom to follow and where the window lies. Raises: InputError, OutputError."""
+    return plan_path(
+        scan.seen,
+        chosen=scan.chosen,
+        frame_rate=options.frame_rate or scan.frame_rate or DEFAULT_RATE,
+        person=options.driver_person,
+        where=str(options.driver),
+        where_first=scan.where_first,
+        where_found=scan.where_found,
+        missing=options.missing,
+    )
+
+
+def choose_run_recipe(options: RenderOptions, plan: DriverPlan, listener: Listener) -> Recipe:
+    """The renderer of a run. Raises: InputError, WeightsError."""
+    digest = digest_file(options.weights, "weights") if options.weights else ""
+    return choose_recipe(options, len(plan.frames), digest, listener)
+
+
+def prepare_run(
+    options: RenderOptions,
+    output_format: OutputFormat,
+    scan: DriverScan,
+    plan: DriverPlan,
+    recipe: Recipe,
+    source: Source,
+) -> Prepared:
+    """The parts put together. Raises: InputError, OutputError."""
+    in_place = options.driver.resolve() == source.iuv_path.resolve()
+    key = run_key(
+        options,
+        source=source_key(options, recipe),
+        recipe=recipe,
+        output_format=output_format,
+        plan=plan,
+        in_place=in_place,
+    )
+    return Prepared(
+        driver=scan.file,
+        plan=plan,
+        recipe=recipe,
+        canvas=_canvas(options, output_format, scan, plan, recipe, source, in_place=in_place),
+        output_format=output_format,
+        audio=choose_audio(
+            options.audio,
+            options.output,
+            output_format,
+            driver=options.driver,
+            start_seconds=plan.first / (scan.frame_rate or plan.frame_rate),
+            duration_seconds=len(plan.frames) / plan.frame_rate,
+        ),
+        chunk_keys=tuple(chunk_key(key, plan, chunk) for chunk in plan.chunks),
+    )
+
+
+def check_length(options: RenderOptions, output_format: OutputFormat, plan: DriverPlan) -> None:
+    """Raises: OutputError for several frames in one picture."""
+    if output_format.kind == "image" and len(plan.frames) > 1:
+        raise OutputError(
+            f"{options.output} is one picture, but {len(plan.frames)} frames are asked for; choose"
+            " one with --frames N, or write a video or a folder"
+        )
+
+
+def _open_stream(path: Path, missing: Missing) -> IuvStream:
+    if not is_motion(path):
+        return open_stream(path, missing=missing)
+    from motion_transfer.people.stream import open_motion
+
+    return open_motion(path)
+
+
+def _canvas(
+    options: RenderOptions,
+    output_format: OutputFormat,
+    scan: DriverScan,
+    plan: DriverPlan,
+    recipe: Recipe,
+    source: Source,
+    *,
+    in_place: bool,
+) -> Canvas:
+    if options.size == "crop":
+        height = width = recipe.working_size(plan.window.side)
+    else:
+        height, width = scan.height, scan.width
+    if options.size == "even":
+        height, width = height + height % 2, width + width % 2
+    comparison = Comparison(source, height, width) if options.compare else None
+    if output_format.kind == "video" and output_format.codec.needs_even_size:
+        panel_height, panel_width = comparison.size if comparison else (height, width)
+        if panel_height % 2 or panel_width % 2:
+            raise OutputError(
+                f"{options.output}: {output_format.codec_name} cannot hold the odd size"
+                f" {panel_width} x {panel_height}; add --size even or --size crop, or write PNG"
+            )
+    background = make_background(options.background, (height, width), source, in_place=in_place)
+    return Canvas(background, crop=options.size == "crop", comparison=comparison)

@@ -1,0 +1,187 @@
+"""Batches through the real command: what is shared, what fails alone, what goes on after a stop."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from motion_transfer.render.plan import CHUNK_FRAMES
+
+FRAMES = 2 * CHUNK_FRAMES + 7
+
+
+@pytest.fixture
+def shoot(studio) -> Path:
+    """Two sources, two drivers, a matrix of four jobs."""
+    for name in ("anna", "ben"):
+        studio.source(name)
+    studio.array(FRAMES, name="walk.npy")
+    studio.array(9, name="wave.npy")
+    return manifest(
+        studio,
+        matrix=[
+            {
+                "sources": ["anna.png", "ben.png"],
+                "drivers": ["walk.npy", "wave.npy"],
+                "output": "{source}_{driver}.mp4",
+            }
+        ],
+    )
+
+
+def manifest(studio, **content: object) -> Path:
+    path = studio.folder / "shoot.yaml"
+    path.write_text(yaml.safe_dump({"version": 1, "output_root": "out", **content}))
+    return path
+
+
+def command(*words: object) -> list[str]:
+    return [sys.executable, "-m", "motion_transfer", "batch", *map(str, words)]
+
+
+def run(path: Path, *more: object) -> tuple[int, list[dict], str]:
+    result = subprocess.run(
+        command("run", path, "--json", *more), capture_output=True, text=True, check=False
+    )
+    return (
+        result.returncode,
+        [json.loads(line) for line in result.stdout.splitlines()],
+        result.stderr,
+    )
+
+
+def named(told: list[dict], kind: str) -> list[dict]:
+    return [event for event in told if event["event"] == kind]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.mp4"))}
+
+
+def kill_after(path: Path, frames_events: int, number: int, *more: object) -> int:
+    """Start a batch, send it a signal after so many chunks; its exit code."""
+    with subprocess.Popen(
+        command("run", path, "--json", "--workers", 1, *more),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    ) as process:
+        assert process.stdout is not None
+        count = 0
+        for line in process.stdout:
+            count += json.loads(line)["event"] == "jobframes"
+            if count == frames_events:
+                process.send_signal(number)
+                count = -1_000_000
+        return process.wait(120)
+
+
+def test_workers_and_kills_change_nothing_and_sources_are_shared(studio, shoot: Path) -> None:
+    code, told, errors = run(shoot, "--workers", 2)
+    assert (code, errors) == (0, "")
+    whole = contents(studio.folder / "out")
+    assert list(whole) == ["anna_walk.mp4", "anna_wave.mp4", "ben_walk.mp4", "ben_wave.mp4"]
+    finished = named(told, "batchfinished")[0]
+    assert (finished["done_count"], finished["feature_maps"]) == (4, 2)
+
+    other = "output_root=other"
+    assert kill_after(shoot, 1, signal.SIGKILL, "--set", other) == -signal.SIGKILL
+    assert all(whole[name] == data for name, data in contents(studio.folder / "other").items())
+    code, told, _ = run(shoot, "--workers", 1, "--set", other)
+    assert code == 0
+    assert contents(studio.folder / "other") == whole
+    planned = named(told, "jobplanned")
+    assert any(event["done_count"] >= CHUNK_FRAMES for event in planned)
+    left = {item.name for item in (studio.folder / "other").iterdir()} - set(whole)
+    assert left == {".shoot.batch", "shoot.report"}
+
+    single = studio.folder / "single.mp4"
+    words = ["run", "--source", studio.folder / "anna.png", "--driver", studio.folder / "walk.npy"]
+    subprocess.run(
+        [sys.executable, "-m", "motion_transfer", *map(str, words), "-o", str(single)], check=True
+    )
+    assert single.read_bytes() == whole["anna_walk.mp4"]
+
+    code, told, _ = run(shoot)  # nothing is to do
+    assert named(told, "batchfinished")[0]["current_count"] == 4
+    studio.source("ben", colours={(2,): (9, 9, 9)})
+    code, told, _ = run(shoot, "--workers", 1)
+    finished = named(told, "batchfinished")[0]
+    assert (code, finished["done_count"], finished["current_count"]) == (0, 2, 2)
+    assert contents(studio.folder / "out")["ben_walk.mp4"] != whole["ben_walk.mp4"]
+
+
+def test_jobs_fail_alone_and_go_on_when_mended(studio, shoot: Path) -> None:
+    damaged = studio.driver(3, name="damaged")
+    good = (damaged / "frame_1_IUV.png").read_bytes()
+    (damaged / "frame_1_IUV.png").write_bytes(good[:60])
+    jobs = [
+        {"source": "gone.png", "driver": "wave.npy", "output": "gone.mp4"},
+        {"source": "anna.png", "driver": "damaged", "output": "damaged.mp4"},
+        {"source": "anna.png", "driver": "wave.npy", "output": "taken.mp4"},
+        {"source": "anna.png", "driver": "wave.npy", "output": "good.mp4"},
+    ]
+    path = manifest(studio, jobs=jobs)
+    (studio.folder / "out").mkdir()
+    (studio.folder / "out/taken.mp4").write_text("mine")
+    code, told, _ = run(path, "--workers", 1)
+    assert code == 1
+    reasons = {event["name"]: event["message"] for event in named(told, "jobfailed")}
+    assert "gone.png does not exist" in reasons["gone.mp4"]
+    assert "frame 1" in reasons["damaged.mp4"]
+    assert "exists already" in reasons["taken.mp4"]
+    assert [event["name"] for event in named(told, "jobdone")] == ["good.mp4"]
+    assert (studio.folder / "out/taken.mp4").read_text() == "mine"
+
+    page = (studio.folder / "out/shoot.report/index.html").read_text()
+    facts = json.loads((studio.folder / "out/shoot.report/report.json").read_text())
+    assert facts["counts"] == {"done": 1, "failed": 3}
+    assert "gone.png does not exist" in page
+    assert (studio.folder / "out/shoot.report/pictures/000003-result.png").exists()
+
+    (damaged / "frame_1_IUV.png").write_bytes(good)
+    studio.source("gone")
+    code, told, _ = run(path, "--workers", 1, "--jobs", ":2")
+    assert (code, len(named(told, "jobdone"))) == (0, 2)
+
+
+def test_a_worker_that_is_killed_fails_nothing_at_first(studio, shoot: Path) -> None:
+    """The system kills the only worker in mid-job: its chunks are tried again in a fresh one."""
+    with subprocess.Popen(
+        command("run", shoot, "--json", "--workers", 1, "--jobs", "0:1"),
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        killed: list[int] = []
+        for line in process.stdout:
+            if json.loads(line)["event"] == "jobplanned":
+                killed = workers_of(process.pid)
+                for pid in killed:
+                    os.kill(pid, signal.SIGKILL)
+        assert process.wait(120) == 0
+    assert killed
+    assert (studio.folder / "out/anna_walk.mp4").exists()
+
+
+def workers_of(pid: int) -> list[int]:
+    """Worker processes of a batch; not Python's own resource tracker."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [
+        c for c in map(int, children) if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()
+    ]
+
+
+def test_ctrl_c_finishes_running_chunks(studio, shoot: Path) -> None:
+    assert kill_after(shoot, 1, signal.SIGINT) == 130
+    code, told, _ = run(shoot, "--workers", 2)
+    assert code == 0
+    assert any(event["done_count"] for event in named(told, "jobplanned"))

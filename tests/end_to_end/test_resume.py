@@ -1,0 +1,174 @@
+"""Killed at any moment and started again, a run ends with the bytes of one that never was."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motion_transfer import render_video
+from motion_transfer.errors import InputError
+from motion_transfer.media.work import work_path
+from motion_transfer.render.events import FramesDone, Notice, Stage, Started
+from motion_transfer.render.plan import CHUNK_FRAMES
+
+FRAMES = 5 * CHUNK_FRAMES + 11
+KILLS = int(os.environ.get("MT_KILLS", "2"))  # a long run sets more
+
+
+def command(studio, output: Path, *more: object) -> list[str]:
+    words = [
+        *("run", "--source", studio.folder / "person.png"),
+        *("--driver", studio.folder / "driver.npy", "-o", output, "--json", *more),
+    ]
+    return [sys.executable, "-m", "motion_transfer", *map(str, words)]
+
+
+@pytest.fixture
+def inputs(studio) -> None:
+    studio.source()
+    studio.array(FRAMES)
+
+
+def killed(words: list[str], after_events: int) -> int | None:
+    """Start a run, kill it after so many events; its exit code, None if it was done before."""
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for count, _ in enumerate(process.stdout):
+            if count == after_events:
+                process.kill()
+                return None
+        return process.wait()
+
+
+def content(path: Path) -> dict[str, bytes]:
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    return {file.name: file.read_bytes() for file in files}
+
+
+@pytest.mark.parametrize("name", ["out.mp4", "out"])
+def test_kills_change_nothing(studio, inputs, name: str) -> None:
+    whole = studio.folder / "whole" / name
+    subprocess.run(command(studio, whole), check=True, capture_output=True)
+    output = studio.folder / "killed" / name
+    moments = random.Random(name)
+    for number in range(KILLS):
+        code = killed(command(studio, output, "--workers", 1 + number % 3), moments.randrange(400))
+        assert code in (None, 0)
+        if code == 0:
+            break
+        assert {item.name for item in output.parent.glob("*")} <= {name, work_path(output).name}
+        assert not output.exists() or content(output) == content(whole)
+    if not output.exists() or work_path(output).exists():
+        subprocess.run(command(studio, output), check=True, capture_output=True)
+    assert content(output) == content(whole)
+    assert [item.name for item in output.parent.iterdir()] == [name]
+
+
+def events(studio, output: Path, *more: object) -> list[dict]:
+    result = subprocess.run(
+        command(studio, output, *more), check=True, capture_output=True, text=True
+    )
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def interrupt_midway(studio, output: Path) -> int:
+    """Stop a run by Ctrl-C when at least one chunk is done; how many frames it says are kept."""
+    with subprocess.Popen(
+        command(studio, output, "--workers", 1),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        assert process.stdout is not None
+        rendered, stage, notices = 0, "", []
+        for line in process.stdout:
+            event = json.loads(line)
+            stage = event.get("name", stage)
+            notices.append(event.get("message", ""))
+            if event["event"] == "framesdone" and stage == "render":
+                rendered += event["frame_count"]
+                if rendered == 2 * CHUNK_FRAMES + 9:
+                    process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
+    kept = next(words for words in notices if "are kept" in words)
+    return int(kept.split()[0])
+
+
+def test_ctrl_c_keeps_chunks_and_the_next_run_does_only_the_rest(studio, inputs) -> None:
+    output = studio.folder / "out.mp4"
+    kept = interrupt_midway(studio, output)
+    assert kept >= 2 * CHUNK_FRAMES
+    assert not output.exists()
+    before = (work_path(output) / "000000.nut").stat()
+    told = events(studio, output)
+    notices = [event["message"] for event in told if event["event"] == "notice"]
+    assert notices == [f"{kept} of {FRAMES} frames were finished before; going on there"]
+    assert before.st_size > 0
+    assert output.exists()
+    assert not work_path(output).exists()
+
+
+def interrupted(studio, output: Path) -> int:
+    """Stop a run in this process after two chunks; how many frames are kept."""
+    kept: list[int] = []
+    rendered = 0
+
+    def stop(event: object) -> None:
+        nonlocal rendered
+        if isinstance(event, Notice):
+            kept.append(int(event.message.split()[0]))
+        if isinstance(event, Stage):
+            rendered = 0
+        if isinstance(event, FramesDone):
+            rendered += event.frame_count
+            if rendered == 2 * CHUNK_FRAMES + 9:
+                raise KeyboardInterrupt
+
+    source, driver = studio.folder / "person.png", studio.folder / "driver.npy"
+    with pytest.raises(KeyboardInterrupt):
+        render_video(source, driver, output, workers=1, listener=stop)
+    return kept[-1]
+
+
+@pytest.mark.parametrize("change", ["driver", "source", "option", "restart"])
+def test_a_changed_input_is_no_old_result(studio, inputs, change: str) -> None:
+    output = studio.folder / "out.mp4"
+    kept = interrupted(studio, output)
+    more: dict = {}
+    expected = 0
+    if change == "driver":
+        frames = np.load(studio.folder / "driver.npy")
+        frames[CHUNK_FRAMES + 3] = frames[CHUNK_FRAMES + 4]
+        np.save(studio.folder / "driver.npy", frames)
+        expected = kept - CHUNK_FRAMES  # the chunk with the changed frame is drawn again
+    elif change == "source":
+        studio.source(colours={(2,): (1, 2, 3)})
+    else:
+        more = {"restart": True} if change == "restart" else {"background": "black"}
+    told: list[object] = []
+    source, driver = studio.folder / "person.png", studio.folder / "driver.npy"
+    render_video(source, driver, output, listener=told.append, **more)
+    notices = [event.message.split()[0] for event in told if isinstance(event, Notice)]
+    assert notices == ([str(expected)] if expected else [])
+    fresh = render_video(source, driver, studio.folder / "fresh.mp4", **more).output
+    assert output.read_bytes() == fresh.read_bytes()
+
+
+def test_a_driver_that_changes_under_the_run_is_noticed(studio, inputs, monkeypatch) -> None:
+    driver = studio.driver(5)
+
+    def change(event: object) -> None:
+        if isinstance(event, Started):
+            studio.image("driver/frame_3_IUV.png", studio.iuv(9, 9))
+
+    with pytest.raises(InputError, match=r"frame 3, .*frame_3_IUV.png has changed since"):
+        render_video(studio.source(), driver, studio.folder / "out.mp4", listener=change)

@@ -1,0 +1,197 @@
+"""Manifests: three syntaxes, one meaning; what is wrong is said with its place."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+
+from motion_transfer.batch.expand import Job, check_inputs, expand
+from motion_transfer.batch.manifest import JobEntry, schema
+from motion_transfer.batch.manifest_file import ManifestError, read_manifest
+from motion_transfer.render.option import list_options
+from motion_transfer.render.options import CHANNEL_ORDERS, RenderOptions
+
+JOBS = Path(__file__).parents[3] / "jobs"
+BATCH_WIDE = {"workers", "restart"}
+
+
+def jobs_of(path: Path, *settings: str) -> list[Job]:
+    return expand(*read_manifest(path, settings))
+
+
+def write(folder: Path, text: str, suffix: str = ".yaml") -> Path:
+    path = folder / f"shoot{suffix}"
+    path.write_text(text)
+    return path
+
+
+def job_text(**words: str) -> str:
+    words = {"source": "a.png", "driver": "d", "output": "a.mp4", **words}
+    lines = "\n".join(f"    {key}: {value}" for key, value in words.items())
+    return "version: 1\njobs:\n  -\n" + lines + "\n"
+
+
+def refusal(path: Path, *settings: str) -> str:
+    with pytest.raises(ManifestError) as caught:
+        jobs_of(path, *settings)
+    return str(caught.value)
+
+
+def test_jobs_take_exactly_the_options_of_a_run() -> None:
+    words = {entry.word for entry in list_options(RenderOptions) if entry.name not in BATCH_WIDE}
+    assert set(JobEntry.model_fields) == words | {"name", "priority"}
+
+
+def test_the_options_know_the_channel_orders() -> None:
+    from motion_transfer.media import iuv_image
+
+    assert iuv_image.CHANNEL_ORDERS == CHANNEL_ORDERS
+
+
+def test_three_syntaxes_mean_the_same(tmp_path: Path) -> None:
+    yaml_text = job_text(fps="30000/1001", compare="true", crf="20", frames='"3:9"')
+    data = {
+        "version": 1,
+        "jobs": [
+            {
+                "source": "a.png",
+                "driver": "d",
+                "output": "a.mp4",
+                "fps": "30000/1001",
+                "compare": True,
+                "crf": 20,
+                "frames": "3:9",
+            }
+        ],
+    }
+    toml_text = (
+        'version = 1\n[[jobs]]\nsource = "a.png"\ndriver = "d"\noutput = "a.mp4"\n'
+        'fps = "30000/1001"\ncompare = true\ncrf = 20\nframes = "3:9"\n'
+    )
+    got = [
+        jobs_of(write(tmp_path, yaml_text)),
+        jobs_of(write(tmp_path, json.dumps(data), ".json")),
+        jobs_of(write(tmp_path, toml_text, ".toml")),
+    ]
+    assert got[0] == got[1] == got[2]
+    assert got[0][0].options.source == tmp_path / "a.png"
+    assert got[0][0].options.frames == (3, 9)
+
+
+def test_defaults_lie_under_jobs_and_settings_over_them(tmp_path: Path) -> None:
+    text = job_text(background="black").replace(
+        "jobs:", "defaults:\n  background: photo\n  size: even\njobs:"
+    )
+    path = write(tmp_path, text)
+    options = jobs_of(path)[0].options
+    assert (options.background, options.size) == ("black", "even")
+    options = jobs_of(path, "background=#102030", "crf=30", "output_root=out")[0].options
+    assert (options.background, options.crf) == ("#102030", 30)
+    assert options.output == tmp_path / "out/a.mp4"
+
+
+def test_a_matrix_and_globs_spread(tmp_path: Path) -> None:
+    for name in ("b.png", "a.png", "a_IUV.png", "b_iuv.png", "walk.mkv", "run.mkv"):
+        (tmp_path / name).touch()
+    text = (
+        "version: 1\nmatrix:\n  - sources: ['*.png']\n    drivers:"
+        " ['*.mkv', 'people:wave,frames=3']\n    output: '{source}/{index}_{driver}.mp4'\n"
+    )
+    outputs = [str(j.options.output.relative_to(tmp_path)) for j in jobs_of(write(tmp_path, text))]
+    assert outputs == [
+        *("a/1_run.mp4", "a/2_walk.mp4", "a/3_wave.mp4"),
+        *("b/4_run.mp4", "b/5_walk.mp4", "b/6_wave.mp4"),
+    ]
+
+
+WRONG = {
+    "field": ({"ouput": "x.mp4"}, "shoot.yaml:7: jobs[0].ouput: unknown field; did you mean outpu"),
+    "choice": ({"size": "huge"}, "shoot.yaml:7: jobs[0].size: 'huge': Input should be 'driver', "),
+    "value": ({"fps": "fast"}, "shoot.yaml:7: jobs[0].fps: 'fast': fps 'fast'; write a number"),
+    "number": ({"crf": "low"}, "shoot.yaml:7: jobs[0].crf: 'low': Input should be a valid integ"),
+    "parts": (
+        {"garments": "[{photo: x.png, parts: hat}]"},
+        "shoot.yaml:7: jobs[0].garments: [{'photo': 'x.png', 'parts': 'hat'}]: unknown part 'hat'",
+    ),
+    "template": ({"output": "'{who}.mp4'"}, "shoot.yaml:6: jobs[0].output: '{who}.mp4' is no te"),
+    "glob": ({"source": "'*.gif'"}, "shoot.yaml:4: jobs[0].source: '*.gif' matches nothing"),
+    "together": ({"renderer": "texture", "weights": "w"}, "shoot.yaml:4: jobs[0]: the texture r"),
+    "ending": ({"output": "a.xyz"}, "shoot.yaml:4: jobs[0]: cannot write FOLDER/a.xyz: un"),
+    "codec": ({"codec": "vp8"}, "shoot.yaml:4: jobs[0]: unknown codec 'vp8'; supported are h264"),
+    "dots": ({"output": "../a.mp4"}, "shoot.yaml:6: jobs[0].output: '../a.mp4' leaves the output"),
+    "absolute": ({"output": "/a.mp4"}, "shoot.yaml:6: jobs[0].output: '/a.mp4' leaves the output"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, case: str) -> None:
+    words, message = WRONG[case]
+    assert refusal(write(tmp_path, job_text(**words))).startswith(
+        f"{tmp_path}/{message.replace('FOLDER', str(tmp_path))}"
+    )
+
+
+def test_links_do_not_lead_out_of_the_root(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/away").symlink_to("/tmp")
+    (tmp_path / "out/link.mp4").symlink_to("/tmp/x.mp4")
+    for output in ("away/a.mp4", "link.mp4"):
+        path = write(tmp_path, job_text(output=output))
+        assert "leaves the output root" in refusal(path, "output_root=out")
+        assert jobs_of(path, "output_root=out", "outside_outputs=true")
+
+
+def test_two_jobs_cannot_have_one_output(tmp_path: Path) -> None:
+    text = job_text() + "  - {source: b.png, driver: d, output: ./a.mp4}\n"
+    assert "shoot.yaml:7: jobs[1].output:" in refusal(write(tmp_path, text))
+    assert "shoot.yaml:4: jobs[0]" in refusal(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix", "words"),
+    [
+        ("version: 1\njobs: [", ".yaml", "shoot.yaml:"),
+        ('{"version": 1,', ".json", "line 1 column"),
+        ("version = ]", ".toml", "line 1"),
+        ("version: 2\njobs: []\n", ".yaml", "shoot.yaml:1: version: 2: Input should be 1"),
+        ("jobs: []\n", ".yaml", "version: is missing"),
+        ("version: 1\n", ".yaml", "no jobs"),
+        ("- a\n", ".yaml", "a manifest is a mapping"),
+        ("", ".ini", "unknown ending; supported are .yaml"),
+        ("version = 1\n[[jobs]]\n\nsource = 3\nsize = 1\n", ".toml", "shoot.toml:5: jobs[0].size"),
+    ],
+)
+def test_files_that_are_no_manifest(tmp_path: Path, text: str, suffix: str, words: str) -> None:
+    assert words in refusal(write(tmp_path, text, suffix))
+
+
+def test_missing_inputs_are_named_once(tmp_path: Path) -> None:
+    text = job_text() + "  - {source: a.png, driver: d, output: b.mp4}\n"
+    assert list(check_inputs(jobs_of(write(tmp_path, text)))) == [
+        f"job 0 (a.mp4): source {tmp_path}/a.png does not exist",
+        f"job 0 (a.mp4): driver {tmp_path}/d does not exist",
+    ]
+
+
+@pytest.mark.parametrize("name", ["demo.yaml", "matrix.yaml", "cluster.toml"])
+def test_the_manifests_of_the_project_are_valid(name: str, tmp_path: Path) -> None:
+    manifest, text = read_manifest(JOBS / name)
+    if name == "demo.yaml":
+        assert list(check_inputs(expand(manifest, text))) == []
+    else:
+        assert manifest.matrix
+
+
+def test_the_published_schema_is_current() -> None:
+    assert json.loads((JOBS / "manifest.schema.json").read_text()) == schema()
+
+
+def test_many_jobs_are_read_quickly(tmp_path: Path) -> None:
+    lines = (f"  - {{source: {i % 9}.png, driver: d, output: {i}.mp4}}\n" for i in range(2000))
+    path = write(tmp_path, "version: 1\njobs:\n" + "".join(lines))
+    began = time.process_time()
+    assert len(jobs_of(path)) == 2000
+    assert time.process_time() - began < 2  # it takes 0.4 s of an idle core
