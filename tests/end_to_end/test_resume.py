@@ -19,7 +19,7 @@ from motion_transfer.media.work import work_path
 from motion_transfer.render.events import FramesDone, Notice, Stage, Started
 from motion_transfer.render.plan import CHUNK_FRAMES
 
-FRAMES = 5 * CHUNK_FRAMES + 11
+FRAMES = 3 * CHUNK_FRAMES + 11
 KILLS = int(os.environ.get("MT_KILLS", "2"))  # a long run sets more
 
 
@@ -60,7 +60,7 @@ def test_kills_change_nothing(studio, inputs, name: str) -> None:
     output = studio.folder / "killed" / name
     moments = random.Random(name)
     for number in range(KILLS):
-        code = killed(command(studio, output, "--workers", 1 + number % 3), moments.randrange(400))
+        code = killed(command(studio, output, "--workers", 1 + number % 3), moments.randrange(190))
         assert code in (None, 0)
         if code == 0:
             break
