@@ -125,13 +125,12 @@ class WeightsCandidate(RenderedCandidate):
     """The network with one checkpoint. Raises: WeightsError."""
 
     def __init__(self, path: Path, background: str) -> None:
-        from motion_transfer.render.neural_renderer import PreparedNetwork, choose_dtype
+        from motion_transfer.render.neural_renderer import PreparedNetwork
         from motion_transfer.weights import load_checkpoint
 
         self._model = load_checkpoint(path)
         self._network = PreparedNetwork(self._model, compile=False)
         self._path = path
-        self._choose_dtype = choose_dtype
         super().__init__(
             path.stem,
             texture_size=self._model.config.texture_size,

@@ -153,6 +153,33 @@ def test_jobs_fail_alone_and_go_on_when_mended(studio, shoot: Path) -> None:
     assert (code, len(named(told, "jobdone"))) == (0, 2)
 
 
+def test_held_frames_are_as_in_a_single_run_and_reported(studio) -> None:
+    """In the second chunk the frame to repeat is read from the first."""
+    frames = studio.walk(CHUNK_FRAMES + 4)
+    frames[[0, 9, *range(CHUNK_FRAMES - 1, CHUNK_FRAMES + 2)]] = 0
+    source, driver = studio.source(), studio.array(frames)
+    jobs = [
+        {"source": source.name, "driver": driver.name, "missing": "hold", "output": f"{name}.mp4"}
+        for name in "ab"
+    ]
+    path = manifest(studio, jobs=jobs)
+    code, told, _ = run(path, "--workers", 1)
+    assert code == 0
+    note = f"nobody found in 5 of {CHUNK_FRAMES + 4} frames, the frame before: 0:00.00-0:00.03"
+    assert [e["name"] for e in named(told, "jobnotice") if note in e["message"]] == [
+        "a.mp4",
+        "b.mp4",
+    ]
+    report = studio.folder / "out/shoot.report"
+    assert note in json.loads((report / "report.json").read_text())["jobs"][1]["note"]
+    assert note in (report / "index.html").read_text()
+    single = studio.folder / "single.mp4"
+    words = ["run", "--source", source, "--driver", driver, "--missing", "hold", "-o", single]
+    subprocess.run([sys.executable, "-m", "motion_transfer", *map(str, words)], check=True)
+    for name in "ab":
+        assert (studio.folder / f"out/{name}.mp4").read_bytes() == single.read_bytes()
+
+
 def test_a_worker_that_is_killed_fails_nothing_at_first(studio, shoot: Path) -> None:
     """The system kills the only worker in mid-job: its chunks are tried again in a fresh one."""
     with subprocess.Popen(

@@ -117,7 +117,7 @@ def test_ctrl_c_keeps_chunks_and_the_next_run_does_only_the_rest(studio, inputs)
     assert not work_path(output).exists()
 
 
-def interrupted(studio, output: Path) -> int:
+def interrupted(studio, output: Path, **more: object) -> int:
     """Stop a run in this process after two chunks; how many frames are kept."""
     kept: list[int] = []
     rendered = 0
@@ -135,7 +135,7 @@ def interrupted(studio, output: Path) -> int:
 
     source, driver = studio.folder / "person.png", studio.folder / "driver.npy"
     with pytest.raises(KeyboardInterrupt):
-        render_video(source, driver, output, workers=1, listener=stop)
+        render_video(source, driver, output, workers=1, listener=stop, **more)
     return kept[-1]
 
 
@@ -161,6 +161,62 @@ def test_a_changed_input_is_no_old_result(studio, inputs, change: str) -> None:
     assert notices == ([str(expected)] if expected else [])
     fresh = render_video(source, driver, studio.folder / "fresh.mp4", **more).output
     assert output.read_bytes() == fresh.read_bytes()
+
+
+def test_a_held_frame_that_changed_is_drawn_again_wherever_it_is_shown(studio, inputs) -> None:
+    """The second chunk begins with frames that repeat the first one's last."""
+    output, driver = studio.folder / "out.mp4", studio.folder / "driver.npy"
+    frames = np.load(driver)
+    frames[CHUNK_FRAMES : CHUNK_FRAMES + 3] = 0
+    np.save(driver, frames)
+    assert interrupted(studio, output, missing="hold") == 2 * CHUNK_FRAMES
+    held = frames[CHUNK_FRAMES - 1]
+    held[held[..., 0] == 2, 1] ^= 1  # the same person in the same place
+    np.save(driver, frames)
+    told: list[object] = []
+    source = studio.folder / "person.png"
+    render_video(source, driver, output, listener=told.append, missing="hold")
+    notices = [event.message for event in told if isinstance(event, Notice)]
+    assert [words.split(",")[0] for words in notices] == [f"nobody found in 3 of {FRAMES} frames"]
+    fresh = render_video(source, driver, studio.folder / "fresh.mp4", missing="hold").output
+    assert output.read_bytes() == fresh.read_bytes()
+
+
+def test_what_is_held_is_part_of_what_is_kept(studio, inputs) -> None:
+    output, driver = studio.folder / "out.mp4", studio.folder / "driver.npy"
+    frames = np.load(driver)
+    frames[5] = 0
+    np.save(driver, frames)
+    kept = interrupted(studio, output, missing="hold")
+    told: list[object] = []
+    source = studio.folder / "person.png"
+    render_video(source, driver, output, listener=told.append)
+    notices = [event.message for event in told if isinstance(event, Notice)]
+    assert notices[0].startswith(f"{kept - CHUNK_FRAMES} of {FRAMES} frames were finished")
+    assert "background only" in notices[1]
+
+
+def test_a_held_frame_that_changes_under_the_run_is_noticed(studio, inputs) -> None:
+    frames = studio.walk(CHUNK_FRAMES + 2)
+    frames[CHUNK_FRAMES:] = 0
+    driver, rendered = studio.driver(frames), 0
+
+    def change(event: object) -> None:
+        nonlocal rendered
+        if isinstance(event, Stage):
+            rendered = 0
+        if isinstance(event, FramesDone):
+            rendered += event.frame_count
+            if rendered == CHUNK_FRAMES:
+                studio.image(f"driver/frame_{CHUNK_FRAMES - 1}_IUV.png", studio.iuv(9, 9))
+
+    with pytest.raises(InputError, match=rf"frame {CHUNK_FRAMES - 1}, .* has changed since"):
+        render_video(
+            *(studio.source(), driver, studio.folder / "out.mp4"),
+            workers=1,
+            missing="hold",
+            listener=change,
+        )
 
 
 def test_a_driver_that_changes_under_the_run_is_noticed(studio, inputs, monkeypatch) -> None:

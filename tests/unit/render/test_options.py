@@ -105,7 +105,7 @@ def options(**changes) -> RenderOptions:
         ({"renderer": "gan"}, "renderer is 'gan'; supported are texture, nhrr"),
         ({"iuv_order": "bgr"}, "iuv_order is 'bgr'; supported are iuv, vui"),
         ({"source_iuv_order": "bgr"}, "source_iuv_order is 'bgr'"),
-        ({"missing": "skip"}, "missing is 'skip'; supported are fail, hold"),
+        ({"missing": "skip"}, "missing is 'skip'; supported are hold, background, fail"),
         ({"size": "huge"}, "size is 'huge'; supported are driver, crop, even"),
         ({"renderer": "nhrr"}, "needs --weights"),
         ({"renderer": "texture", "weights": Path("w")}, "uses no weights"),
