@@ -19,7 +19,7 @@ from functools import cache
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.errors import IuvFileError
 from nhrr_core.uv_layout import TWIN_SIZE, load_uv_layout

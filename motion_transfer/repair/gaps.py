@@ -8,7 +8,7 @@ from typing import Literal
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.repair.speckles import take_nearest
 

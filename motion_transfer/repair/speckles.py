@@ -23,9 +23,10 @@ def take_nearest(iuv: Frame, wrong: Bool[np.ndarray, "H W"]) -> Frame:
     """Every wrong pixel replaced by the nearest right one, as a whole; all wrong: unchanged."""
     if wrong.all():
         return iuv
-    _, nearest = cv2.distanceTransformWithLabels(
+    _, labels = cv2.distanceTransformWithLabels(
         wrong.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
+    nearest = np.asarray(labels, np.int32)
     pixel_of_label = np.zeros(int(nearest.max()) + 1, np.int64)
     right = np.flatnonzero(~wrong)
     pixel_of_label[nearest.reshape(-1)[right]] = right
@@ -43,5 +44,5 @@ def _find_speckles(part: UInt8[np.ndarray, "H W"], smallest_px: int) -> Bool[np.
         _, labels, stats, _ = cv2.connectedComponentsWithStats(mask[box], connectivity=8)
         small = stats[:, cv2.CC_STAT_AREA] < smallest_px
         small[0] = False  # what is not of this part
-        speckles[box] |= small[labels]
+        speckles[box] |= small[np.asarray(labels, np.int32)]
     return speckles
