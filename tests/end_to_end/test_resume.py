@@ -199,13 +199,13 @@ def test_what_is_held_is_part_of_what_is_kept(studio, inputs) -> None:
 def test_a_held_frame_that_changes_under_the_run_is_noticed(studio, inputs) -> None:
     frames = studio.walk(CHUNK_FRAMES + 2)
     frames[CHUNK_FRAMES:] = 0
-    driver, rendered = studio.driver(frames), 0
+    driver, rendered, stage = studio.driver(frames), 0, ""
 
     def change(event: object) -> None:
-        nonlocal rendered
+        nonlocal rendered, stage
         if isinstance(event, Stage):
-            rendered = 0
-        if isinstance(event, FramesDone):
+            stage = event.name
+        if isinstance(event, FramesDone) and stage == "render":
             rendered += event.frame_count
             if rendered == CHUNK_FRAMES:
                 studio.image(f"driver/frame_{CHUNK_FRAMES - 1}_IUV.png", studio.iuv(9, 9))
