@@ -125,13 +125,15 @@ class NeuralReRenderer(nn.Module):
     ) -> Float[Tensor, "B K H W"]:
         """The frame, from what RenderNet drew of a feature image.
 
-        With `config.colour_shortcut` the image's colours show through; otherwise it is the drawing.
+        With `config.colour_shortcut` the image's colours show through where it shows the body;
+        otherwise it is the drawing.
         """
         if not self.config.colour_shortcut:
             return drawn
         painted, alpha, share = drawn.tensor_split([COLOUR_CHANNELS, -1], dim=1)
         colours = feature_image[:, :COLOUR_CHANNELS].clamp(-1, 1)
-        return torch.cat([torch.lerp(painted, colours, (share + 1) / 2), alpha], dim=1)
+        body = (feature_image != 0).any(dim=1, keepdim=True)
+        return torch.cat([torch.lerp(painted, colours, body * (share + 1) / 2), alpha], dim=1)
 
     def forward(
         self,

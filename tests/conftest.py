@@ -30,7 +30,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     is_worker = hasattr(session.config, "workerinput")
     cache = Path(os.environ.get("ANNY_CACHE_DIR", Path.home() / ".cache" / "anny"))
     if not is_worker and find_spec("anny") and not any(cache.glob("v*/build_compact*")):
-        subprocess.Popen([sys.executable, "-c", PREPARE_BODY], stderr=subprocess.DEVNULL)
+        process = subprocess.Popen([sys.executable, "-c", PREPARE_BODY], stderr=subprocess.DEVNULL)
+        process.returncode = 0  # nobody waits for it, and Popen need not warn of that
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -74,7 +74,8 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
 
         Returns: `source_texture` 3 x T x T in [-1, 1] and `source_visibility` 1 x T x T;
             `target_image` 3 x S x S in [-1, 1], `target_iuv` uint8 3 x S x S; where wanted
-            `target_alpha` 1 x S x S in [-1, 1], `target_texture` and `target_visibility`.
+            `target_alpha` 1 x S x S and `target_background` 3, both in [-1, 1],
+            `target_texture` and `target_visibility`.
         Raises: InputError for a file that broke meanwhile.
         """
         random = np.random.default_rng((self._settings.seed, 1, number))
@@ -100,6 +101,8 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         sample = {"target_image": to_tensor(rgb), "target_iuv": _chw(window.cut(target.iuv, size))}
         if settings.alpha:
             sample["target_alpha"] = to_tensor(self._cut_alpha(window, target, size))
+            if (colour := parse_colour(settings.background)) is not None:
+                sample["target_background"] = torch.tensor(colour) / 127.5 - 1
         names = ("source_texture", "source_visibility")
         sample |= zip(names, self._texture(pair.source, shrink), strict=True)
         if settings.target_texture:

@@ -112,6 +112,19 @@ def real_image(batch: Batch) -> Float[Tensor, "B K S S"]:
     return batch["target_image"]
 
 
+def shown_image(batch: Batch, drawn: Drawn) -> Float[Tensor, "B K S S"]:
+    """What is judged: a drawing with alpha over the background that the real image has, too.
+
+    So the colours at an outline are the person's alone, and fit any other background as well.
+    """
+    assert drawn.image is not None
+    if "target_background" not in batch:
+        return drawn.image
+    colours, alpha = drawn.image.tensor_split([COLOUR_CHANNELS], dim=1)
+    background = batch["target_background"][:, :, None, None]
+    return torch.cat([torch.lerp(background, colours, (alpha + 1) / 2), alpha], dim=1)
+
+
 def generator_terms(
     batch: Batch, drawn: Drawn, judges: Judges, discriminator: nn.Module | None
 ) -> Terms:
@@ -129,7 +142,8 @@ def generator_terms(
         )
     if drawn.image is None or drawn.feature_image is None:
         return terms
-    colours, truth = drawn.image[:, :COLOUR_CHANNELS], batch["target_image"]
+    image = shown_image(batch, drawn)
+    colours, truth = image[:, :COLOUR_CHANNELS], batch["target_image"]
     if judges.perceptual is not None:
         with torch.no_grad():
             wanted = judges.perceptual(truth)
@@ -142,19 +156,19 @@ def generator_terms(
     if judges.identity is not None:
         terms["identity"] = judges.identity(colours, truth, batch["target_iuv"]).float()
     if "target_alpha" in batch:
-        terms["alpha"] = alpha_loss(drawn.image[:, COLOUR_CHANNELS:], batch["target_alpha"])
+        terms["alpha"] = alpha_loss(image[:, COLOUR_CHANNELS:], batch["target_alpha"])
     if discriminator is not None:
-        logits = discriminator(drawn.image, drawn.feature_image.detach())
+        logits = discriminator(image, drawn.feature_image.detach())
         terms["adversarial"] = adversarial_loss([scale.float() for scale in logits])
     return terms
 
 
 def discriminator_term(batch: Batch, drawn: Drawn, discriminator: nn.Module) -> Tensor:
     """L_D of a batch; nothing of it reaches the generator."""
-    assert drawn.image is not None and drawn.feature_image is not None
+    assert drawn.feature_image is not None
     condition = drawn.feature_image.detach()
     # one pass over both: its instance norm looks at each image alone
-    pairs = torch.cat([real_image(batch), drawn.image.detach()])
+    pairs = torch.cat([real_image(batch), shown_image(batch, drawn).detach()])
     logits = [scale.float() for scale in discriminator(pairs, condition.repeat(2, 1, 1, 1))]
     halves = [scale.chunk(2) for scale in logits]
     return discriminator_loss([real for real, _ in halves], [fake for _, fake in halves])

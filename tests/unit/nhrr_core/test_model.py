@@ -166,9 +166,12 @@ def test_the_share_of_the_shortcut(targets: Tensor, variant: str, alpha: bool) -
     channels = model.config.drawn_channels
     drawn = torch.rand(3, channels, 32, 32) * 2 - 1
     drawn[0, -1], drawn[1, -1], drawn[2, -1] = 1, -1, 0
+    feature_image[:, :, :, :5] = 0  # off the body
     frame = model.blend(drawn, feature_image)
+    assert torch.equal(frame[..., :5], drawn[:, : frame.shape[1], :, :5])
+    frame, drawn, feature_image = (x[..., 5:] for x in (frame, drawn, feature_image))
     colours = feature_image[:, :3].clamp(-1, 1)
-    assert frame.shape == (3, 4 if alpha else 3, 32, 32)
+    assert frame.shape == (3, 4 if alpha else 3, 32, 27)
     assert torch.allclose(frame[0, :3], colours[0])
     assert torch.allclose(frame[1, :3], drawn[1, :3])
     assert torch.allclose(frame[2, :3], (drawn[2, :3] + colours[2]) / 2)

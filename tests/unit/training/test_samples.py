@@ -47,6 +47,7 @@ def test_shapes_and_ranges(paint_pairs) -> None:
         "target_image": picture,
         "target_iuv": ((3, 64, 64), torch.uint8),
         "target_alpha": plane,
+        "target_background": ((3,), torch.float32),
         "source_texture": picture,
         "source_visibility": plane,
         "target_texture": picture,
@@ -63,6 +64,7 @@ def test_the_background_is_replaced_where_alpha_is_known(paint_pairs) -> None:
     outside = sample["target_alpha"][0] == -1
     inside = (sample["target_iuv"][0] > 0) & (sample["target_alpha"][0] == 1)
     green = torch.tensor([-1.0, 1.0, -1.0])
+    assert torch.equal(sample["target_background"], green)
     assert outside.float().mean() > 0.3
     assert torch.equal(sample["target_image"][:, outside], green[:, None].expand(3, outside.sum()))
     assert not (sample["target_image"][:, inside] == green[:, None]).all(0).any()
@@ -73,13 +75,19 @@ def test_a_photo_without_alpha_is_refused_by_a_model_with(paint_pairs) -> None:
     with pytest.raises(InputError, match=r"0_1\.png has no alpha"):
         samples[0]
     plain = open_samples(paint_pairs(1, alpha=False), alpha=False)[0]
-    assert "target_alpha" not in plain
+    assert not {"target_alpha", "target_background"} & set(plain)
+    left = open_samples(paint_pairs(1), background="photo")[0]
+    assert "target_alpha" in left
+    assert "target_background" not in left
 
 
 def test_the_first_samples_have_half_the_sides(paint_pairs, tmp_path) -> None:
     path = paint_pairs()
     samples = open_samples(path, half_size_samples=2, textures=tmp_path)
-    sides = [{value.shape[-1] for value in samples[number].values()} for number in range(4)]
+    sides = [
+        {value.shape[-1] for value in samples[number].values() if value.ndim == 3}
+        for number in range(4)
+    ]
     assert sides == [{32}, {32}, {64}, {64}]
     assert same(samples[2], open_samples(path)[2])
     assert same(samples[0], open_samples(path, half_size_samples=2)[0]), "kept or not"

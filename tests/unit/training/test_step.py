@@ -16,7 +16,7 @@ from motion_transfer.training.faces import FaceIdentity
 from motion_transfer.training.feature_networks import FeatureNetwork
 from motion_transfer.training.sphereface import SphereFace20
 from motion_transfer.training.step import Arithmetic, Average, Players, set_stage, update
-from motion_transfer.training.terms import Generator, Judges, load_judges
+from motion_transfer.training.terms import Drawn, Generator, Judges, load_judges, shown_image
 from nhrr_core import VARIANTS, Discriminator, LossWeights, ModelConfig, NeuralReRenderer
 
 PLAIN = Arithmetic(nullcontext, lambda loss: loss.backward(), lambda network: network)
@@ -119,6 +119,29 @@ def test_alpha_is_learned_and_judged() -> None:
     terms = game.update()
     assert "alpha" in terms
     assert next(game.discriminator.parameters()).shape[1] == 4 + 16
+
+
+def test_what_is_judged_lies_over_the_background() -> None:
+    """Whoever is not there at all may be of any colour."""
+    game = Game(alpha=True)
+    background = torch.tensor([[1.0, 0.0, -1.0], [0.5, 0.5, 0.5]])
+    image = torch.rand(2, 4, 8, 8) * 2 - 1
+    image[:, 3, :, :2], image[:, 3, :, 2:4], image[:, 3, :, 4:] = -1, 1, 0
+    drawn = Drawn(torch.empty(0), None, image)
+    assert torch.equal(shown_image({}, drawn), image)
+    shown = shown_image({"target_background": background}, drawn)
+    behind = background[:, :, None, None].expand(-1, -1, 8, 8)
+    assert torch.equal(shown[:, :3, :, :2], behind[..., :2])
+    assert torch.allclose(shown[:, :3, :, 2:4], image[:, :3, :, 2:4])
+    assert torch.allclose(shown[:, :3, :, 4:], (image[:, :3, :, 4:] + behind[..., 4:]) / 2)
+    assert torch.equal(shown[:, 3], image[:, 3])
+    plain = game.update()
+    over = Game(alpha=True)
+    over.batch["target_background"] = background
+    terms = over.update()
+    for name in ("perceptual", "adversarial"):
+        assert terms[name] != plain[name], name
+    assert terms["alpha"] == plain["alpha"]
 
 
 def test_the_total_is_weighted() -> None:

@@ -105,6 +105,20 @@ def test_stopped_and_resumed_is_uninterrupted(
     assert_same(ours, theirs)
 
 
+@pytest.mark.parametrize("stop_at", [1, 2, 3])
+def test_stopped_and_resumed_across_stages(tmp_path: Path, run: Run, stop_at: int) -> None:
+    """Two steps at half size, one at full size, one with the discriminator, as on people."""
+    stages = {"optimiser.half_size": 0.5, "losses.adversarial_from": 0.75, "run.steps": 4}
+    shortcuts = {"model.prefilled": True, "model.colour_shortcut": True}
+    whole = Run(tmp_path / "whole", run.settings)
+    whole.train(**stages, **shortcuts)
+    assert run.train(stop_at=stop_at, **stages, **shortcuts).stopped
+    assert run.train().step == 4
+    assert_same(run.checkpoint(4), whole.checkpoint(4))
+    judged = ["adversarial" in event.terms for event in whole.logged]
+    assert judged == [False, False, False, True]
+
+
 def test_a_run_can_be_made_longer(tmp_path: Path, run: Run) -> None:
     whole = Run(tmp_path / "whole", run.settings)
     whole.train()
