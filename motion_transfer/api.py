@@ -24,6 +24,7 @@ def render_video(
     source_iuv: AnyPath | None = None,
     weights: AnyPath | None = None,
     sheet: AnyPath | None = None,
+    audio: AnyPath | None = None,
     frames: str | tuple[int | None, int | None] | None = None,
     frame_rate: str | float | Fraction | None = None,
     garments: Sequence[Garment] = (),
@@ -37,6 +38,7 @@ def render_video(
         driver: folder of IUV images, IUV image, lossless IUV video, `.npy`, `.npz`, or a motion
             such as `people:walk`.
         output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder of PNG.
+        audio: file whose sound is laid under, or `"none"`; else the driver's own, if it has any.
         frames: `"10:50"` or `(10, 50)`, half-open.
         frame_rate: frames per second, exact if given as a string or Fraction.
         garments: parts taken from other photos.
@@ -55,6 +57,7 @@ def render_video(
             source_iuv=_path(source_iuv),
             weights=_path(weights),
             sheet=_path(sheet),
+            audio=_path(audio),
             frames=parse_frames(frames) if isinstance(frames, str) else frames or (None, None),
             frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
             garments=tuple(garments),

@@ -197,7 +197,9 @@ def _copy_packets(
     rate: Fraction,
     audio: AudioCut | None,
 ) -> None:
-    options = {"movflags": "+faststart"} if destination.suffix in (".mp4", ".mov") else {}
+    options = {"fflags": "+bitexact"}  # or Matroska's are marked with random numbers
+    if destination.suffix in (".mp4", ".mov"):
+        options["movflags"] = "+faststart"
     orders = [_showing_order(path, rate) for path, _ in segments]
     delay = max(index - number for order in orders for index, number in enumerate(order))
     with av.open(str(destination), "w", options=options) as output:

@@ -29,7 +29,7 @@ def content(path: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("renderer", ["texture", "nhrr"])
-@pytest.mark.parametrize("output", ["out.mp4", "out"])
+@pytest.mark.parametrize("output", ["out.mp4", "out.mkv", "out.webm", "out"])
 def test_bytes_do_not_depend_on_workers(
     studio, checkpoint: Path, renderer: str, output: str
 ) -> None:

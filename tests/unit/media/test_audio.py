@@ -123,3 +123,12 @@ def test_sound_that_cannot_be(tmp_path: Path, song: Path) -> None:
     silent = make(tmp_path / "silent.mp4", None)
     with pytest.raises(InputError, match="has no sound in it"):
         choose(str(silent), "out.mp4", tmp_path)
+
+
+def test_python_takes_the_name_of_a_file(studio, song: Path) -> None:
+    from motion_transfer import render_video
+
+    output = studio.folder / "out.mp4"
+    render_video(studio.source(), studio.array(3), output, renderer="texture", audio=str(song))
+    with av.open(str(output)) as container:
+        assert container.streams.audio
