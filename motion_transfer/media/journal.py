@@ -34,7 +34,7 @@ class Journal:
     def _read(self) -> tuple[list[Entry], int]:
         try:
             data = self._path.read_bytes()
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return [], 0
         entries: list[Entry] = []
         whole_bytes = 0

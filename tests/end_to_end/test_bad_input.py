@@ -141,7 +141,7 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
     "workers zero": (["--workers", "0"], "workers is 0"),
     "renderer unknown": (["--renderer", "gan"], "renderer is 'gan'"),
     "renderer without weights": (["--renderer", "nhrr"], "needs --weights"),
-    "weights missing": (["--weights", "none.safetensors"], "weights none.* do not exist"),
+    "weights missing": (["--weights", "none.safetensors"], "weights none.* does not exist"),
     "codec unknown": (["--codec", "prores"], "unknown codec 'prores'"),
     "codec in another container": (["--codec", "ffv1"], r"\.mp4 cannot hold ffv1"),
     "crf too high": (["--crf", "99"], "--crf 99: h264 takes a crf of 0 to 51"),
