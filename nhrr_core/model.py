@@ -60,10 +60,13 @@ class NeuralReRenderer(nn.Module):
             residual_blocks=config.residual_blocks,
         )
         layout = load_uv_layout()
-        for name in ("charts", "side_twin", "depth_twin", "position"):
-            self.register_buffer(name, getattr(layout, name).clone(), persistent=False)
-        surroundings = measure_surroundings(layout.position)
-        self.register_buffer("surroundings", surroundings, persistent=False)
+        tables = {"charts": layout.charts.clone()}
+        if config.prefilled:
+            for name in ("side_twin", "depth_twin", "position"):
+                tables[name] = getattr(layout, name).clone()
+            tables["surroundings"] = measure_surroundings(layout.position)
+        for name, table in tables.items():
+            self.register_buffer(name, table, persistent=False)
 
     def encode(
         self, photo: Float[Tensor, "B 3 H W"], iuv: UInt8[Tensor, "B 3 H W"]

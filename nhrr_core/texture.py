@@ -164,12 +164,15 @@ def measure_surroundings(position: Float[Tensor, "256 256 3"]) -> Float[Tensor, 
     Args:
         position: of `UVLayout`, in metres.
     """
-    given, wanted = (
-        position[step // 2 :: step, step // 2 :: step].reshape(-1, 3)
-        for step in (position.shape[0] // count for count in (FILL_FROM, FILL_TO))
-    )
+    given, wanted = (_places(position, count).reshape(-1, 3) for count in (FILL_FROM, FILL_TO))
     squared = torch.cdist(given, wanted).square()
     return (FILL_METRES**2 / (squared + FILL_METRES**2)) ** 3
+
+
+def _places(position: Float[Tensor, "256 256 3"], count: int) -> Float[Tensor, "P P 3"]:
+    """Where the middles of count x count equal shares of the texture lie on the body."""
+    step = position.shape[0] // count
+    return position[step // 2 :: step, step // 2 :: step]
 
 
 def _lie_at_their_place(position: Float[Tensor, "256 256 3"], size: int) -> Bool[Tensor, "T T"]:
@@ -178,8 +181,7 @@ def _lie_at_their_place(position: Float[Tensor, "256 256 3"], size: int) -> Bool
     Places at the border of a chart hold texels of another part of the body, too.
     """
     step = position.shape[0] // FILL_FROM
-    places = position[step // 2 :: step, step // 2 :: step]
-    own = places.repeat_interleave(step, 0).repeat_interleave(step, 1)
+    own = _places(position, FILL_FROM).repeat_interleave(step, 0).repeat_interleave(step, 1)
     near = (position - own).norm(dim=-1) < PLACE_METRES
     return F.interpolate(near[None, None].float(), (size, size), mode="nearest")[0, 0] > 0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +13,7 @@ from jaxtyping import UInt8
 from motion_transfer.errors import InputError
 from motion_transfer.evaluation.results_folder import ResultsFolder
 from motion_transfer.media.image import Photo
+from motion_transfer.media.work import digest_of
 from motion_transfer.render.compose import make_background, paste
 from motion_transfer.render.person import Person, occupancy
 from motion_transfer.render.renderer import Renderer
@@ -139,14 +139,12 @@ class WeightsCandidate(RenderedCandidate):
         )
 
     def describe(self) -> dict[str, Any]:
-        with self._path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
         return {
             "label": self.label,
             "kind": "weights",
             "renderer": "nhrr",
             "file": self._path.name,
-            "sha256": digest,
+            "sha256": digest_of(self._path),
             "configuration": self._model.config.to_dict(),
         }
 

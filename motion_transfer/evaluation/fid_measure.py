@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -14,6 +13,7 @@ from jaxtyping import Float, UInt8
 
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.evaluation.measures import Column
+from motion_transfer.media.work import digest_of
 from motion_transfer.training.metrics import frechet_distance
 
 Image = UInt8[np.ndarray, "H W 3"]
@@ -57,7 +57,7 @@ class FidMeasure:
         except RuntimeError as error:
             raise WeightsError(f"weights {weights} cannot be read: {error}") from error
         self._resize = resizing.build_resizer("clean")
-        digest = hashlib.sha256(weights.read_bytes()).hexdigest()[:16]
+        digest = digest_of(weights)[:16]
         definition = f"FID, clean-fid's resizing and Inception; weights sha256 {digest}"
         self.columns = (Column("fid", "lower", 2, definition),)
 
