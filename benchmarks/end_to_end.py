@@ -34,7 +34,13 @@ from motion_transfer.render.run import prepare, run
 
 def texture_rate(folder: Path, frame_count: int, rounds: int) -> None:
     driver = driver_folder(folder, frame_count)
-    options = RenderOptions(source=SOURCE, driver=driver, output=folder / "texture.mp4", force=True)
+    options = RenderOptions(
+        source=SOURCE,
+        driver=driver,
+        output=folder / "texture.mp4",
+        renderer="texture",
+        force=True,
+    )
     rates = [frame_count / run(options).wall_seconds for _ in range(rounds)]
     print(
         f"texture, 256 x 256, {frame_count} PNG frames, end to end:"

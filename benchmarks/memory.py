@@ -22,7 +22,8 @@ def peak_mib(driver: Path, output: Path, weights: Path | None) -> float:
     """Run in a fresh process and report its peak resident size."""
     from motion_transfer import render_video
 
-    render_video(SOURCE, driver, output, weights=weights, compile=False)
+    renderer = "nhrr" if weights else "texture"
+    render_video(SOURCE, driver, output, renderer=renderer, weights=weights, compile=False)
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 

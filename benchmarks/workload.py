@@ -9,7 +9,7 @@ import cv2
 import torch
 
 from motion_transfer.media.iuv_stream import open_reader, open_stream
-from motion_transfer.weights import save_checkpoint
+from motion_transfer.weights.checkpoint import save_checkpoint
 from nhrr_core import ModelConfig, NeuralReRenderer
 
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"

@@ -210,12 +210,18 @@ def mt(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
     return call
 
 
+@pytest.fixture
+def draft(mt: Callable[..., Outcome]) -> Callable[..., Outcome]:
+    """`mt run` with the texture renderer: exact colours, and no network to load."""
+    return lambda *arguments: mt("run", "--renderer", "texture", *arguments)
+
+
 @pytest.fixture(scope="session")
 def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A tiny untrained model, the same in every run."""
     import torch
 
-    from motion_transfer.weights import save_checkpoint
+    from motion_transfer.weights.checkpoint import save_checkpoint
     from nhrr_core import ModelConfig, NeuralReRenderer
 
     config = ModelConfig(

@@ -26,7 +26,7 @@ def look_name(options: RenderOptions) -> str:
     """Jobs of one name share a source's appearance: the feature map."""
     words = (
         *(options.source, options.source_iuv, options.source_iuv_order, options.person),
-        *(options.garments, options.renderer_name, options.weights),
+        *(options.garments, options.renderer, options.weights),
     )
     return "look-" + key_of({"look": words})[:32]
 

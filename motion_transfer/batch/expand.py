@@ -16,6 +16,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.people.motion_name import is_motion
 from motion_transfer.render.option import list_options
 from motion_transfer.render.options import NO_AUDIO, RenderOptions, options_from_words
+from motion_transfer.weights.shipped import SHIPPED, find_weights
 
 OPTIONS = {entry.word: entry for entry in list_options(RenderOptions)}
 BELOW_ROOT = ("output", "sheet")
@@ -131,7 +132,8 @@ class _Spread:
                 {**g, **{k: str(self._folder / g[k]) for k in ("photo", "iuv") if g.get(k)}}
                 for g in value
             ]
-        fixed = word in BELOW_ROOT or (word == "audio" and value == NO_AUDIO)
+        fixed = word in BELOW_ROOT or (word, value) == ("audio", NO_AUDIO)
+        fixed = fixed or (word == "weights" and value in SHIPPED)
         if OPTIONS[word].kind != "path" or fixed or is_motion(value):
             return value
         return value if value.startswith("/") else f"{self._folder}/{value}"
@@ -209,7 +211,8 @@ def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
     for job in jobs:
         options = job.options
         paths = [("source", options.source), ("driver", options.driver)]
-        paths += [(w, p) for w, p in (("weights", options.weights),) if p is not None]
+        if options.weights is not None:
+            paths.append(("weights", find_weights(options.weights)))
         paths += [("garment", garment.photo) for garment in options.garments]
         if options.audio is not None and str(options.audio) != NO_AUDIO:
             paths.append(("audio", options.audio))

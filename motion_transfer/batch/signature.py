@@ -31,8 +31,8 @@ def source_files(options: RenderOptions) -> Iterator[Path]:
     for garment in options.garments:
         yield garment.photo
         yield garment.iuv or find_iuv_beside(garment.photo)
-    if options.weights is not None:
-        yield options.weights
+    if options.weights_file is not None:
+        yield options.weights_file
 
 
 def driver_files(options: RenderOptions) -> Iterator[Path]:

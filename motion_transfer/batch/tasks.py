@@ -107,8 +107,8 @@ def look(options: RenderOptions) -> tuple[bytes, bytes, Files]:
     from motion_transfer.render.source import prepare_source
 
     files = sign_files(source_files(options))
-    digest = digest_file(options.weights, "weights") if options.weights else ""
-    recipe = Recipe(options.renderer_name, options.weights, digest)
+    digest = digest_file(options.weights_file, "weights") if options.weights_file else ""
+    recipe = Recipe(options.renderer, options.weights_file, digest)
     source = prepare_source(options, recipe.texture_size)
     return pickle.dumps(source, 5), pickle.dumps(recipe.appearance_of(source), 5), files
 

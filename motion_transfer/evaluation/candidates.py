@@ -126,8 +126,10 @@ class WeightsCandidate(RenderedCandidate):
 
     def __init__(self, path: Path, background: str) -> None:
         from motion_transfer.render.neural_renderer import PreparedNetwork
-        from motion_transfer.weights import load_checkpoint
+        from motion_transfer.weights.checkpoint import load_checkpoint
+        from motion_transfer.weights.shipped import find_weights
 
+        path = find_weights(path)
         self._model = load_checkpoint(path)
         self._network = PreparedNetwork(self._model, compile=False)
         self._path = path

@@ -25,7 +25,8 @@ from motion_transfer.people.extra import PEOPLE_EXTRA, missing_packages
 from motion_transfer.render.neural_renderer import choose_dtype
 from motion_transfer.render.person import find_people
 from motion_transfer.version import __version__
-from motion_transfer.weights import inspect_checkpoint
+from motion_transfer.weights.checkpoint import inspect_checkpoint
+from motion_transfer.weights.shipped import SHIPPED, find_weights
 from nhrr_core import PART_GROUPS, PART_NAMES, PRESETS, ModelConfig, RenderNet
 from nhrr_core.feature_net import FeatureNet
 
@@ -60,12 +61,12 @@ def describe_setup() -> Facts:
             "torch.", ""
         ),
         "renderers": {
-            "texture": "ready (default; a draft, no weights)",
-            "nhrr": "with --weights FILE",
+            "nhrr": "the network (default)",
+            "texture": "a draft without it",
         },
         "raw pictures": _describe_estimators(),
         "people": f"pip install '{PEOPLE_EXTRA}'" if missing_packages() else "installed",
-        "weights": "none ship yet",
+        "weights": {name: _describe_shipped(name) for name in SHIPPED},
         "presets": {name: describe_preset(config) for name, config in PRESETS.items()},
     }
 
@@ -134,6 +135,13 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
         except InputError:
             raise error from None
     return _describe_iuv(reader)
+
+
+def _describe_shipped(name: str) -> str:
+    path = find_weights(Path(name))
+    notes = inspect_checkpoint(path).notes
+    size = f"{path.stat().st_size / 1e6:.0f} MB"
+    return f"{size}, licence {notes['licence']}, trained on {notes['data']}, {notes['step']} steps"
 
 
 def _describe_weights(path: Path) -> Facts:

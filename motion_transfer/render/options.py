@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from motion_transfer.errors import InputError
 from motion_transfer.render.option import REQUIRED, Option, list_options, option
+from motion_transfer.weights.shipped import DEFAULT_WEIGHTS, find_weights
 
 if TYPE_CHECKING:  # help has to be instant, and these need the libraries that do the work
     from motion_transfer.media.iuv_image import ChannelOrder
@@ -18,7 +19,7 @@ if TYPE_CHECKING:  # help has to be instant, and these need the libraries that d
 
 CHANNEL_ORDERS = ("iuv", "vui")
 MISSING = ("hold", "background", "fail")
-RENDERERS = ("texture", "nhrr")
+RENDERERS = ("nhrr", "texture")
 NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
 DEFAULT_RATE = Fraction(30)
@@ -40,11 +41,11 @@ class RenderOptions:
     """The options of a run: what `mt run` takes, what a manifest's jobs may set, and its defaults.
 
     Paths of drivers may name a motion, `people:walk` (see `people.stream`). `frames` is a half-open
-    range of the driver's frames, either end open. A `renderer` of None is `nhrr` if weights are
-    given; a `frame_rate` of None is the driver's own, or 30; `audio` None is the driver's own, if
-    it has one; `missing` None fails for numbers missing from a folder, and shows background where
-    nobody is found. Nothing here but the content of the inputs and what is drawn decides the
-    output's bytes: `workers` never does.
+    range of the driver's frames, either end open. `weights` may name a checkpoint that ships, and
+    None is the default one; a `frame_rate` of None is the driver's own, or 30; `audio` None is the
+    driver's own, if it has one; `missing` None fails for numbers missing from a folder, and shows
+    background where nobody is found. Nothing here but the content of the inputs and what is drawn
+    decides the output's bytes: `workers` never does.
     """
 
     source: Path = option(
@@ -114,15 +115,19 @@ class RenderOptions:
         kind="garments",
         default=(),
     )
-    renderer: str | None = option(
+    renderer: str = option(
         "--renderer",
         "Rendering",
-        "texture (a draft, no weights; default) or nhrr (the network; default with --weights).",
+        "nhrr (the network; default) or texture (a draft without it, faster).",
+        default="nhrr",
         choices=RENDERERS,
         metavar="NAME",
     )
     weights: Path | None = option(
-        "--weights", "Rendering", "Checkpoint for nhrr, safetensors.", kind="path"
+        "--weights",
+        "Rendering",
+        "Checkpoint for nhrr, safetensors; default: lite, which ships.",
+        kind="path",
     )
     background: str = option(
         "--background",
@@ -205,8 +210,6 @@ class RenderOptions:
             if entry.choices and value != entry.default and value not in entry.choices:
                 listed = ", ".join(entry.choices)
                 raise InputError(f"{entry.name} is {value!r}; supported are {listed}")
-        if self.renderer == "nhrr" and self.weights is None:
-            raise InputError("the nhrr renderer needs --weights FILE; none ship yet")
         if self.renderer == "texture" and self.weights is not None:
             raise InputError("the texture renderer uses no weights; leave out --weights")
         if self.workers is not None and self.workers < 1:
@@ -214,9 +217,11 @@ class RenderOptions:
         parse_colour(self.background)
 
     @property
-    def renderer_name(self) -> str:
-        """The renderer that runs: the given one, else what the weights call for."""
-        return self.renderer or ("texture" if self.weights is None else "nhrr")
+    def weights_file(self) -> Path | None:
+        """The checkpoint that draws; None for a renderer without one. Raises: WeightsError."""
+        if self.renderer == "texture":
+            return None
+        return find_weights(self.weights or DEFAULT_WEIGHTS)
 
     @property
     def worker_count(self) -> int:

@@ -133,7 +133,7 @@ def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
 
 def choose_run_recipe(options: RenderOptions, plan: DriverPlan, listener: Listener) -> Recipe:
     """The renderer of a run. Raises: InputError, WeightsError."""
-    digest = digest_file(options.weights, "weights") if options.weights else ""
+    digest = digest_file(options.weights_file, "weights") if options.weights_file else ""
     return choose_recipe(options, len(plan.frames), digest, listener)
 
 

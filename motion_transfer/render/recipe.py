@@ -52,7 +52,7 @@ class Recipe:
         """Side, px, of the partial texture that `appearance_of` wants. Raises: WeightsError."""
         if self.weights is None:
             return TEXTURE_SIZE
-        from motion_transfer.weights import inspect_checkpoint
+        from motion_transfer.weights.checkpoint import inspect_checkpoint
 
         return inspect_checkpoint(self.weights).config.texture_size
 
@@ -60,7 +60,7 @@ class Recipe:
         """Side of the crops that the renderer will want, px. Raises: WeightsError."""
         if self.weights is None:
             return window_side
-        from motion_transfer.weights import inspect_checkpoint
+        from motion_transfer.weights.checkpoint import inspect_checkpoint
 
         return inspect_checkpoint(self.weights).config.image_size
 
@@ -87,7 +87,7 @@ class Recipe:
 
 @lru_cache(maxsize=KEPT_NETWORKS)
 def _open_model(weights: Path, _digest: str) -> NeuralReRenderer:
-    from motion_transfer.weights import load_checkpoint
+    from motion_transfer.weights.checkpoint import load_checkpoint
 
     return load_checkpoint(weights).to("cuda" if torch.cuda.is_available() else "cpu")
 
@@ -111,10 +111,10 @@ def choose_recipe(
         digest: of the weights file; empty if there is none.
     Raises: WeightsError; InputError if compiling is asked for and there is no compiler.
     """
-    if options.renderer_name == "texture":
+    if options.renderer == "texture":
         return Recipe("texture")
     compiles = _decide_compile(options.compile, frame_count)
-    recipe = Recipe("nhrr", options.weights, digest, compiles)
+    recipe = Recipe("nhrr", options.weights_file, digest, compiles)
     if compiles:
         listener(Notice("compiling the network, half a minute at most; later runs find it done"))
     began = time.perf_counter()

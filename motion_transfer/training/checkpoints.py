@@ -27,7 +27,7 @@ from torch import nn
 from motion_transfer.errors import InputError
 from motion_transfer.media.publish import explain_disk_errors, publish
 from motion_transfer.training.config import KeepingSettings
-from motion_transfer.weights import load_checkpoint, save_checkpoint
+from motion_transfer.weights.checkpoint import load_checkpoint, save_checkpoint
 from nhrr_core import NeuralReRenderer
 
 STATE = "state.json"

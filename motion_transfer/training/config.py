@@ -164,6 +164,8 @@ class KeepingSettings:
         keep_every: those at multiples of it are kept for good.
         sample_every: sample grids of `samples` pairs.
         log_every: a line, and scalars for TensorBoard.
+        textures: folder that keeps unfolded textures, which runs on the same photos may share;
+            empty: `textures` in the run's.
     """
 
     checkpoint_every: int = 250
@@ -172,6 +174,7 @@ class KeepingSettings:
     sample_every: int = 250
     samples: int = 4
     log_every: int = 10
+    textures: str = ""
     tensorboard: bool = True
 
 

@@ -9,7 +9,7 @@ from motion_transfer.media.publish import explain_disk_errors
 from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.config_file import write_toml
 from motion_transfer.version import __version__
-from motion_transfer.weights import save_checkpoint
+from motion_transfer.weights.checkpoint import save_checkpoint
 from nhrr_core import NeuralReRenderer
 
 

@@ -12,7 +12,7 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from motion_transfer.errors import WeightsError
-from motion_transfer.weights import list_misfits
+from motion_transfer.weights.checkpoint import list_misfits
 
 
 class FrozenNetwork(nn.Module):

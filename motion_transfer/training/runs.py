@@ -25,7 +25,8 @@ from motion_transfer.training.events import Listener
 from motion_transfer.training.extra import require_training
 from motion_transfer.training.sources import TrainingData, open_training_data
 from motion_transfer.training.terms import load_judges
-from motion_transfer.weights import load_checkpoint
+from motion_transfer.weights.checkpoint import load_checkpoint
+from motion_transfer.weights.shipped import SHIPPED, find_weights
 from nhrr_core import NeuralReRenderer
 from nhrr_core.config import PRESETS
 
@@ -136,9 +137,9 @@ def is_first_process() -> bool:
 
 
 def _load_init(name: str) -> NeuralReRenderer:
-    if name in PRESETS:
+    if name in PRESETS and name not in SHIPPED:
         raise WeightsError(
-            f"--init {name}: no weights ship with the program yet; give the file of a checkpoint,"
-            f" or train from random weights with --preset {name}"
+            f"--init {name}: no such weights ship with the program; give the file of a checkpoint,"
+            f" start from {', '.join(SHIPPED)}, or train from random weights with --preset {name}"
         )
-    return load_checkpoint(Path(name))
+    return load_checkpoint(find_weights(Path(name)))

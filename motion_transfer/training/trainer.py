@@ -119,11 +119,11 @@ class Trainer:
 
     def _make_samples(self) -> TrainingSamples:
         config = self._config
-        textures = self._run / "textures"
+        textures = Path(config.keeping.textures or self._run / "textures")
         if getattr(self._data.pairs, "endless", False):
             textures = None
         elif self._accelerator.is_main_process:
-            textures.mkdir(exist_ok=True)
+            textures.mkdir(parents=True, exist_ok=True)
         self._accelerator.wait_for_everyone()
         return TrainingSamples(
             self._data.pairs,

@@ -140,8 +140,10 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
     "missing unknown": (["--missing", "skip"], "missing is 'skip'"),
     "workers zero": (["--workers", "0"], "workers is 0"),
     "renderer unknown": (["--renderer", "gan"], "renderer is 'gan'"),
-    "renderer without weights": (["--renderer", "nhrr"], "needs --weights"),
-    "weights missing": (["--weights", "none.safetensors"], "weights none.* does not exist"),
+    "weights missing": (
+        ["--renderer", "nhrr", "--weights", "none.safetensors"],
+        "weights none.* does not exist",
+    ),
     "codec unknown": (["--codec", "prores"], "unknown codec 'prores'"),
     "codec in another container": (["--codec", "ffv1"], r"\.mp4 cannot hold ffv1"),
     "crf too high": (["--crf", "99"], "--crf 99: h264 takes a crf of 0 to 51"),
@@ -189,13 +191,13 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_bad_input(studio, mt, case: str) -> None:
+def test_bad_input(studio, draft, case: str) -> None:
     spoil, reason = CASES[case]
     arguments = ["--source", studio.source(), "--driver", studio.driver(FRAMES)]
     arguments += ["-o", studio.folder / "out.mp4"]
     more = spoil(studio) if callable(spoil) else spoil
     before = sorted(studio.folder.rglob("*"))
-    result = mt("run", *arguments, *(more if isinstance(more, list) else []))
+    result = draft(*arguments, *(more if isinstance(more, list) else []))
     assert result.code == 2
     assert result.out == ""
     (line,) = result.err.splitlines()
@@ -238,32 +240,32 @@ def test_broken_weights(studio, mt, checkpoint: Path) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_an_unreadable_file(studio, mt) -> None:
+def test_an_unreadable_file(studio, draft) -> None:
     source = studio.source()
     source.chmod(0)
-    result = mt("run", "--source", source, "--driver", studio.driver(1), "-o", "out.mp4")
+    result = draft("--source", source, "--driver", studio.driver(1), "-o", "out.mp4")
     assert (result.code, result.err.count("\n")) == (2, 1)
     assert "cannot be read: Permission denied" in result.err
 
 
-def test_a_frame_with_too_few_pixels(studio, mt) -> None:
+def test_a_frame_with_too_few_pixels(studio, draft) -> None:
     """The only damage that libpng sees first; it says so itself, in a line before ours."""
     source, driver = studio.source(), studio.driver(FRAMES)
     spoil_pixels(frame(studio))
-    result = mt("run", "--source", source, "--driver", driver, "-o", studio.folder / "out.mp4")
+    result = draft("--source", source, "--driver", driver, "-o", studio.folder / "out.mp4")
     assert result.code == 2
     assert re.match(r"mt: frame 2, .*frame_2_IUV\.png is not a", result.err.splitlines()[-1])
 
 
 @pytest.mark.parametrize("output", ["out.mp4", "out"])
-def test_an_existing_output_is_untouched_without_force(studio, mt, output: str) -> None:
+def test_an_existing_output_is_untouched_without_force(studio, draft, output: str) -> None:
     path = studio.folder / output
     if path.suffix:
         path.write_text("old")
     else:
         path.mkdir()
     before = sorted(studio.folder.rglob("*"))
-    result = mt("run", "--source", "a.png", "--driver", "b", "-o", path)
+    result = draft("--source", "a.png", "--driver", "b", "-o", path)
     assert result.code == 2
     assert result.err == f"mt: {path} exists already; choose another name or add --force\n"
     assert sorted(studio.folder.rglob("*")) == before
@@ -271,11 +273,11 @@ def test_an_existing_output_is_untouched_without_force(studio, mt, output: str) 
 
 
 @pytest.mark.parametrize("old", ["file", "folder"])
-def test_force_replaces_whatever_was_there(studio, mt, old: str) -> None:
+def test_force_replaces_whatever_was_there(studio, draft, old: str) -> None:
     path = studio.folder / "out"
     path.mkdir() if old == "folder" else path.write_text("old")
-    result = mt(
-        *("run", "--source", studio.source(), "--driver", studio.driver(2)),
+    result = draft(
+        *("--source", studio.source(), "--driver", studio.driver(2)),
         *("-o", path, "--force", "-q"),
     )
     assert (result.code, result.out, result.err) == (0, "", "")

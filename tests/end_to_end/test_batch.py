@@ -38,7 +38,8 @@ def shoot(studio) -> Path:
 
 def manifest(studio, **content: object) -> Path:
     path = studio.folder / "shoot.yaml"
-    path.write_text(yaml.safe_dump({"version": 1, "output_root": "out", **content}))
+    head = {"version": 1, "output_root": "out", "defaults": {"renderer": "texture"}}
+    path.write_text(yaml.safe_dump({**head, **content}))
     return path
 
 
@@ -104,7 +105,8 @@ def test_workers_and_kills_change_nothing_and_sources_are_shared(studio, shoot: 
     assert left == {".shoot.batch", "shoot.report"}
 
     single = studio.folder / "single.mp4"
-    words = ["run", "--source", studio.folder / "anna.png", "--driver", studio.folder / "walk.npy"]
+    words = ["run", "--renderer", "texture", "--source", studio.folder / "anna.png"]
+    words += ["--driver", studio.folder / "walk.npy"]
     subprocess.run(
         [sys.executable, "-m", "motion_transfer", *map(str, words), "-o", str(single)], check=True
     )
@@ -174,7 +176,8 @@ def test_held_frames_are_as_in_a_single_run_and_reported(studio) -> None:
     assert note in json.loads((report / "report.json").read_text())["jobs"][1]["note"]
     assert note in (report / "index.html").read_text()
     single = studio.folder / "single.mp4"
-    words = ["run", "--source", source, "--driver", driver, "--missing", "hold", "-o", single]
+    words = ["run", "--renderer", "texture", "--source", source, "--driver", driver]
+    words += ["--missing", "hold", "-o", single]
     subprocess.run([sys.executable, "-m", "motion_transfer", *map(str, words)], check=True)
     for name in "ab":
         assert (studio.folder / f"out/{name}.mp4").read_bytes() == single.read_bytes()

@@ -36,9 +36,12 @@ def cluster() -> Iterator[Any]:
 def test_a_node_that_dies_changes_nothing(studio, cluster) -> None:
     source = studio.source("anna")
     studio.array(FRAMES, name="walk.npy")
-    whole = render_video(source, studio.folder / "walk.npy", studio.folder / "whole.mp4").output
+    whole = render_video(
+        source, studio.folder / "walk.npy", studio.folder / "whole.mp4", renderer="texture"
+    ).output
     path: Path = studio.folder / "shoot.yaml"
     job = {"source": "anna.png", "driver": "walk.npy", "output": "anna.mp4"}
+    job["renderer"] = "texture"
     path.write_text(
         yaml.safe_dump({"version": 1, "output_root": "out", "retries": 3, "jobs": [job]})
     )

@@ -84,7 +84,10 @@ def test_a_candidate_is_what_mt_run_draws(studio, mt, pairs: Path, checkpoint: P
     methods = ("--weights", checkpoint, "--renderer", "texture")
     common = ("--pairs", pairs, "--limit", 1, *METRICS, *SIZE)
     mt("eval", *common, *methods, "-o", out, "--save-images")
-    for method, extra in (("tiny", ("--weights", checkpoint)), ("texture", ())):
+    for method, extra in (
+        ("tiny", ("--weights", checkpoint)),
+        ("texture", ("--renderer", "texture")),
+    ):
         picture = studio.folder / f"{method}.png"
         result = mt(
             *("run", "--source", studio.folder / "a.png", "--driver", studio.folder / "c_IUV.png"),

@@ -18,7 +18,8 @@ LIMIT_BYTES = 200
 
 
 def run(studio, output: Path, **settings) -> subprocess.CompletedProcess[str]:
-    arguments = ["run", "--source", studio.source(), "--driver", studio.driver(20), "-o", output]
+    arguments = ["run", "--renderer", "texture", "--source", studio.source()]
+    arguments += ["--driver", studio.driver(20), "-o", output]
     if output.suffix == ".mkv":
         arguments += ["--codec", "ffv1"]
     command = [sys.executable, "-B", "-m", "motion_transfer", *map(str, arguments)]

@@ -24,7 +24,8 @@ def long_driver(studio) -> Path:
 
 def start(studio, *more: object) -> subprocess.Popen[str]:
     arguments = [
-        *("run", "--source", studio.source(), "--driver", long_driver(studio)),
+        *("run", "--renderer", "texture", "--source", studio.source()),
+        *("--driver", long_driver(studio)),
         *("--missing", "hold", "-o", studio.folder / "new/out.mp4", "--json", *more),
     ]
     command = [sys.executable, "-m", "motion_transfer", *map(str, arguments)]

@@ -11,13 +11,13 @@ pytest.importorskip("warp", reason="needs the `people` extra")
 pytestmark = pytest.mark.usefixtures("body_model")
 
 
-def test_drive_then_run(mt, studio):
+def test_drive_then_run(mt, draft, studio):
     driver = studio.folder / "walk.mkv"
     made = mt("people", "drive", "walk", "--frames", 6, "--size", "64x96", "-o", driver)
     assert (made.code, made.err) == (0, "")
     assert made.out == f"{driver}: 6 frames, 0.20 s of walk\n"
     video = studio.folder / "out.mp4"
-    done = mt("run", "--source", studio.source(), "--driver", driver, "-o", video, "-q")
+    done = draft("--source", studio.source(), "--driver", driver, "-o", video, "-q")
     assert (done.code, done.err) == (0, "")
     with av.open(str(video)) as container:
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
@@ -25,17 +25,17 @@ def test_drive_then_run(mt, studio):
     assert all(frame.min() < 200 for frame in frames)  # somebody is there
 
 
-def test_a_motion_on_the_fly_gives_the_same_video_as_its_recording(mt, studio):
+def test_a_motion_on_the_fly_gives_the_same_video_as_its_recording(mt, draft, studio):
     source, spec = studio.source(), "people:wave,frames=5,size=64x96"
     mt("people", "drive", "wave", "--frames", 5, "--size", "64x96", "-o", studio.folder / "iuv")
     videos = [studio.folder / name for name in ("fly.mp4", "file.mp4")]
     for driver, video in zip((spec, studio.folder / "iuv"), videos, strict=True):
-        done = mt("run", "--source", source, "--driver", driver, "-o", video, "-q")
+        done = draft("--source", source, "--driver", driver, "-o", video, "-q")
         assert (done.code, done.err) == (0, "")
     assert videos[0].read_bytes() == videos[1].read_bytes()
 
 
-def test_render_then_run_on_one_of_them(mt, studio):
+def test_render_then_run_on_one_of_them(mt, draft, studio):
     out = studio.folder / "people"
     done = mt("people", "render", "--count", 1, "--size", "96x128", "--out", out, "--workers", 1)
     assert (done.code, done.err) == (0, "")
@@ -44,7 +44,7 @@ def test_render_then_run_on_one_of_them(mt, studio):
     assert again.out == f"{out}: 0 people added (1 were there), 2 photos each\n"
     picture = studio.folder / "same.png"
     person = out / "000000" / "0.png"
-    run = mt("run", "--source", person, "--driver", out / "000000" / "0_IUV.png", "-o", picture)
+    run = draft("--source", person, "--driver", out / "000000" / "0_IUV.png", "-o", picture)
     assert (run.code, run.err) == (0, "")
     rendered, photo = cv2.imread(str(picture)), cv2.imread(str(person))
     body = cv2.imread(str(out / "000000" / "0_IUV.png"))[..., 0] > 0

@@ -8,6 +8,7 @@ import random
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,13 @@ from motion_transfer.render.events import FramesDone, Notice, Stage, Started
 from motion_transfer.render.plan import CHUNK_FRAMES
 
 FRAMES = 3 * CHUNK_FRAMES + 11
+draw = partial(render_video, renderer="texture")
 KILLS = int(os.environ.get("MT_KILLS", "2"))  # a long run sets more
 
 
 def command(studio, output: Path, *more: object) -> list[str]:
     words = [
-        *("run", "--source", studio.folder / "person.png"),
+        *("run", "--renderer", "texture", "--source", studio.folder / "person.png"),
         *("--driver", studio.folder / "driver.npy", "-o", output, "--json", *more),
     ]
     return [sys.executable, "-m", "motion_transfer", *map(str, words)]
@@ -135,7 +137,7 @@ def interrupted(studio, output: Path, **more: object) -> int:
 
     source, driver = studio.folder / "person.png", studio.folder / "driver.npy"
     with pytest.raises(KeyboardInterrupt):
-        render_video(source, driver, output, workers=1, listener=stop, **more)
+        draw(source, driver, output, workers=1, listener=stop, **more)
     return kept[-1]
 
 
@@ -156,10 +158,10 @@ def test_a_changed_input_is_no_old_result(studio, inputs, change: str) -> None:
         more = {"restart": True} if change == "restart" else {"background": "black"}
     told: list[object] = []
     source, driver = studio.folder / "person.png", studio.folder / "driver.npy"
-    render_video(source, driver, output, listener=told.append, **more)
+    draw(source, driver, output, listener=told.append, **more)
     notices = [event.message.split()[0] for event in told if isinstance(event, Notice)]
     assert notices == ([str(expected)] if expected else [])
-    fresh = render_video(source, driver, studio.folder / "fresh.mp4", **more).output
+    fresh = draw(source, driver, studio.folder / "fresh.mp4", **more).output
     assert output.read_bytes() == fresh.read_bytes()
 
 
@@ -175,10 +177,10 @@ def test_a_held_frame_that_changed_is_drawn_again_wherever_it_is_shown(studio, i
     np.save(driver, frames)
     told: list[object] = []
     source = studio.folder / "person.png"
-    render_video(source, driver, output, listener=told.append, missing="hold")
+    draw(source, driver, output, listener=told.append, missing="hold")
     notices = [event.message for event in told if isinstance(event, Notice)]
     assert [words.split(",")[0] for words in notices] == [f"nobody found in 3 of {FRAMES} frames"]
-    fresh = render_video(source, driver, studio.folder / "fresh.mp4", missing="hold").output
+    fresh = draw(source, driver, studio.folder / "fresh.mp4", missing="hold").output
     assert output.read_bytes() == fresh.read_bytes()
 
 
@@ -190,7 +192,7 @@ def test_what_is_held_is_part_of_what_is_kept(studio, inputs) -> None:
     kept = interrupted(studio, output, missing="hold")
     told: list[object] = []
     source = studio.folder / "person.png"
-    render_video(source, driver, output, listener=told.append)
+    draw(source, driver, output, listener=told.append)
     notices = [event.message for event in told if isinstance(event, Notice)]
     assert notices[0].startswith(f"{kept - CHUNK_FRAMES} of {FRAMES} frames were finished")
     assert "background only" in notices[1]
@@ -211,7 +213,7 @@ def test_a_held_frame_that_changes_under_the_run_is_noticed(studio, inputs) -> N
                 studio.image(f"driver/frame_{CHUNK_FRAMES - 1}_IUV.png", studio.iuv(9, 9))
 
     with pytest.raises(InputError, match=rf"frame {CHUNK_FRAMES - 1}, .* has changed since"):
-        render_video(
+        draw(
             *(studio.source(), driver, studio.folder / "out.mp4"),
             workers=1,
             missing="hold",
@@ -227,4 +229,4 @@ def test_a_driver_that_changes_under_the_run_is_noticed(studio, inputs, monkeypa
             studio.image("driver/frame_3_IUV.png", studio.iuv(9, 9))
 
     with pytest.raises(InputError, match=r"frame 3, .*frame_3_IUV.png has changed since"):
-        render_video(studio.source(), driver, studio.folder / "out.mp4", listener=change)
+        draw(studio.source(), driver, studio.folder / "out.mp4", listener=change)

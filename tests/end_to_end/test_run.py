@@ -49,11 +49,9 @@ OUTPUTS = [
 
 
 @pytest.mark.parametrize(("name", "more", "atol"), OUTPUTS)
-def test_every_output_shows_the_person(studio, mt, name: str, more: list, atol: float) -> None:
+def test_every_output_shows_the_person(studio, draft, name: str, more: list, atol: float) -> None:
     output = studio.folder / name
-    result = mt(
-        "run", "--source", studio.source(), "--driver", studio.driver(4), "-o", output, *more
-    )
+    result = draft("--source", studio.source(), "--driver", studio.driver(4), "-o", output, *more)
     assert (result.code, result.err) == (0, "")
     assert result.out.startswith(f"wrote {output}: 4 frames, 0.13 s (texture renderer")
     assert_dressed(frames_of(output), studio.walk(4), atol)
@@ -61,14 +59,14 @@ def test_every_output_shows_the_person(studio, mt, name: str, more: list, atol: 
 
 @pytest.mark.parametrize("kind", ["driver", "video", "array"])
 @pytest.mark.parametrize("order", ["iuv", "vui"])
-def test_every_driver_gives_the_same_frames(studio, mt, kind: str, order: str) -> None:
+def test_every_driver_gives_the_same_frames(studio, draft, kind: str, order: str) -> None:
     frames = studio.walk(3)
     if kind == "array":
         driver = studio.array(frames if order == "iuv" else frames[..., ::-1])
     else:
         driver = getattr(studio, kind)(frames, order=order)
     output = studio.folder / "out"
-    assert mt("run", "--source", studio.source(), "--driver", driver, "-o", output).code == 0
+    assert draft("--source", studio.source(), "--driver", driver, "-o", output).code == 0
     assert_dressed(frames_of(output), frames, 0.5)
 
 
@@ -80,10 +78,10 @@ def test_every_driver_gives_the_same_frames(studio, mt, kind: str, order: str) -
         (["--fps", "24000/1001"], Fraction(24000, 1001)),
     ],
 )
-def test_rate_and_length(studio, mt, more: list, rate: Fraction) -> None:
+def test_rate_and_length(studio, draft, more: list, rate: Fraction) -> None:
     output = studio.folder / "out.mp4"
     source, driver = studio.source(), studio.video(60)
-    assert mt("run", "--source", source, "--driver", driver, "-o", output, *more).code == 0
+    assert draft("--source", source, "--driver", driver, "-o", output, *more).code == 0
     with av.open(str(output)) as container:
         stream = container.streams.video[0]
         assert stream.average_rate == rate
@@ -92,44 +90,44 @@ def test_rate_and_length(studio, mt, more: list, rate: Fraction) -> None:
         assert float(stream.duration * stream.time_base) == pytest.approx(float(60 / rate))
 
 
-def test_a_range_of_frames(studio, mt) -> None:
+def test_a_range_of_frames(studio, draft) -> None:
     frames = studio.walk(60)
     source, driver, output = studio.source(), studio.driver(frames), studio.folder / "out"
-    assert mt(*("run", "--source", source, "--driver", driver, "-o", output, "--frames", "10:50"))
+    assert draft(*("--source", source, "--driver", driver, "-o", output, "--frames", "10:50"))
     assert_dressed(frames_of(output), frames[10:50], 0.5)
 
 
-def test_one_frame_as_a_picture(studio, mt) -> None:
+def test_one_frame_as_a_picture(studio, draft) -> None:
     frames = studio.walk(5)
     source, driver, output = studio.source(), studio.driver(frames), studio.folder / "out.png"
-    mt("run", "--source", source, "--driver", driver, "-o", output, "--frames", "3")
+    draft("--source", source, "--driver", driver, "-o", output, "--frames", "3")
     assert_dressed(frames_of(output), frames[3:4], 0.5)
 
 
-def test_odd_frames_are_grown_by_a_pixel(studio, mt) -> None:
+def test_odd_frames_are_grown_by_a_pixel(studio, draft) -> None:
     frames = np.pad(studio.walk(3), ((0, 0), (0, 1), (0, 1), (0, 0)))
     source, driver, output = studio.source(), studio.array(frames), studio.folder / "out.mp4"
-    result = mt("run", "--source", source, "--driver", driver, "-o", output, "--size", "even")
+    result = draft("--source", source, "--driver", driver, "-o", output, "--size", "even")
     assert result.code == 0
     assert_dressed(frames_of(output), np.pad(frames, ((0, 0), (0, 1), (0, 1), (0, 0))), 5)
 
 
-def test_a_crop_shows_the_window(studio, mt) -> None:
+def test_a_crop_shows_the_window(studio, draft) -> None:
     frames = np.stack([studio.iuv(300, 200, size=(400, 500))] * 2)
     source, driver, output = studio.source(), studio.array(frames), studio.folder / "out"
-    mt("run", "--source", source, "--driver", driver, "-o", output, "--size", "crop")
+    draft("--source", source, "--driver", driver, "-o", output, "--size", "crop")
     side = frames_of(output).shape[1]
     assert 90 <= side <= 120
     centre = frames_of(output)[0, side // 2 - 16, side // 2]
     np.testing.assert_allclose(centre, CLOTHES[TORSO], atol=1)
 
 
-def test_frames_without_anybody_are_background_and_noted(studio, mt) -> None:
+def test_frames_without_anybody_are_background_and_noted(studio, draft) -> None:
     frames = studio.walk(6)
     frames[2:4] = 0
     source, driver, output = studio.source(), studio.driver(frames), studio.folder / "out"
-    result = mt(
-        *("run", "--source", source, "--driver", driver, "-o", output),
+    result = draft(
+        *("--source", source, "--driver", driver, "-o", output),
         *("--background", "#102030"),
     )
     assert result.code == 0
@@ -141,12 +139,12 @@ def test_frames_without_anybody_are_background_and_noted(studio, mt) -> None:
     assert (rendered[[0, 1, 4, 5]] != (16, 32, 48)).any(axis=(1, 2, 3)).all()
 
 
-def test_frames_without_anybody_can_be_held(studio, mt) -> None:
+def test_frames_without_anybody_can_be_held(studio, draft) -> None:
     """Chunks begin at 48: there the frame to repeat is read from the chunk before."""
     frames = studio.walk(50)
     frames[[0, 20, 47, 48, 49]] = 0
     source, driver, output = studio.source(), studio.driver(frames), studio.folder / "out"
-    result = mt(*("run", "--source", source, "--driver", driver, "-o", output, "--missing", "hold"))
+    result = draft(*("--source", source, "--driver", driver, "-o", output, "--missing", "hold"))
     assert result.code == 0
     assert "nobody found in 5 of 50 frames, the frame before: 0:00.00-0:00.03" in result.err
     rendered = frames_of(output)
@@ -155,20 +153,20 @@ def test_frames_without_anybody_can_be_held(studio, mt) -> None:
     assert (rendered[48] != 255).any()
 
 
-def test_frames_without_anybody_can_be_refused(studio, mt) -> None:
+def test_frames_without_anybody_can_be_refused(studio, draft) -> None:
     frames = studio.walk(6)
     frames[3] = 0
     source, driver, output = studio.source(), studio.driver(frames), studio.folder / "out"
-    result = mt(*("run", "--source", source, "--driver", driver, "-o", output, "--missing", "fail"))
+    result = draft(*("--source", source, "--driver", driver, "-o", output, "--missing", "fail"))
     assert result.code == 2
     assert "nobody at 0:00.10-0:00.13 (frames 3:4); choose" in result.err
     assert not output.exists()
 
 
-def test_a_held_gap_is_noted_and_repeats(studio, mt) -> None:
+def test_a_held_gap_is_noted_and_repeats(studio, draft) -> None:
     source, driver, output = studio.source(), studio.driver(6), studio.folder / "out"
     (driver / "frame_3_IUV.png").unlink()
-    result = mt(*("run", "--source", source, "--driver", driver, "-o", output, "--missing", "hold"))
+    result = draft(*("--source", source, "--driver", driver, "-o", output, "--missing", "hold"))
     assert result.code == 0
     assert "mt: note: 1 missing frame" in result.err
     rendered = frames_of(output)
@@ -176,39 +174,39 @@ def test_a_held_gap_is_noted_and_repeats(studio, mt) -> None:
     np.testing.assert_array_equal(rendered[3], rendered[2])
 
 
-def test_only_the_chosen_person_of_a_driver_is_rendered(studio, mt) -> None:
+def test_only_the_chosen_person_of_a_driver_is_rendered(studio, draft) -> None:
     pair = np.concatenate([studio.walk(3), studio.walk(3)], axis=2)
     source, driver, output = studio.source(), studio.array(pair), studio.folder / "out"
-    mt("run", "--source", source, "--driver", driver, "-o", output, "--driver-person", "1")
+    draft("--source", source, "--driver", driver, "-o", output, "--driver-person", "1")
     rendered = frames_of(output)
     assert (rendered[:, :, :64] == 255).all()
     assert_dressed(rendered[:, :, 64:], studio.walk(3), 0.5)
 
 
-def test_the_photo_as_background_in_place(studio, mt) -> None:
+def test_the_photo_as_background_in_place(studio, draft) -> None:
     """The source's own IUV as driver: the person is drawn over the untouched photo."""
     source = studio.source()
     iuv, output = studio.folder / "person_IUV.png", studio.folder / "out.png"
-    mt("run", "--source", source, "--driver", iuv, "-o", output, "--background", "photo")
+    draft("--source", source, "--driver", iuv, "-o", output, "--background", "photo")
     difference = frames_of(output)[0].astype(int) - np.asarray(Image.open(source))
     assert np.abs(difference).mean() < 1
     outside = np.asarray(Image.open(iuv))[..., 0] == 0
     assert np.abs(difference[outside]).max() <= 2
 
 
-def test_the_photo_as_background_loses_its_person(studio, mt) -> None:
+def test_the_photo_as_background_loses_its_person(studio, draft) -> None:
     source, driver = studio.source(), studio.array(np.stack([studio.iuv(40, size=(96, 128))]))
     output = studio.folder / "out.png"
-    mt("run", "--source", source, "--driver", driver, "-o", output, "--background", "photo")
+    draft("--source", source, "--driver", driver, "-o", output, "--background", "photo")
     frame = frames_of(output)[0]
     np.testing.assert_allclose(frame[:, :50].astype(int) - GREY, 0, atol=8)
 
 
-def test_comparison_and_contact_sheet(studio, mt) -> None:
+def test_comparison_and_contact_sheet(studio, draft) -> None:
     source, driver, output = studio.source(), studio.driver(5), studio.folder / "out"
     sheet = studio.folder / "sheet.png"
-    mt(
-        *("run", "--source", source, "--driver", driver, "-o", output),
+    draft(
+        *("--source", source, "--driver", driver, "-o", output),
         *("--compare", "--sheet", sheet),
     )
     frames = frames_of(output)
@@ -219,13 +217,13 @@ def test_comparison_and_contact_sheet(studio, mt) -> None:
     assert frames_of(sheet).shape == (1, 2 * 96, 4 * 192, 3)
 
 
-def test_a_garment_in_place(studio, mt) -> None:
+def test_a_garment_in_place(studio, draft) -> None:
     """Shirt from another photo, everything else and the backdrop as they were."""
     source = studio.source()
     shirt = studio.source("shirt", colours={TORSO: (0, 200, 200), HEAD: (0, 0, 0)})
     iuv, output = studio.folder / "person_IUV.png", studio.folder / "out.png"
-    result = mt(
-        *("run", "--source", source, "--driver", iuv, "-o", output, "--background", "photo"),
+    result = draft(
+        *("--source", source, "--driver", iuv, "-o", output, "--background", "photo"),
         *("--garment", shirt, "--garment-parts", "torso"),
     )
     assert result.code == 0
@@ -237,12 +235,12 @@ def test_a_garment_in_place(studio, mt) -> None:
     np.testing.assert_allclose(frame[parts == 0].astype(int) - GREY, 0, atol=2)
 
 
-def test_two_garments(studio, mt) -> None:
+def test_two_garments(studio, draft) -> None:
     shirt = studio.source("shirt", colours={TORSO: (0, 200, 200)})
     jeans = studio.source("jeans", colours={(*LEGS, 5, 6): (250, 0, 250)})
     frames, output = studio.walk(2), studio.folder / "out"
-    mt(
-        *("run", "--source", studio.source(), "--driver", studio.array(frames), "-o", output),
+    draft(
+        *("--source", studio.source(), "--driver", studio.array(frames), "-o", output),
         *("--garment", f"{shirt},{shirt.with_stem('shirt_IUV')}", "--garment-parts", "torso"),
         *("--garment", jeans, "--garment-parts", "upper-legs, lower-legs"),
     )
@@ -265,9 +263,9 @@ def test_the_network_renders(studio, mt, checkpoint: Path) -> None:
     assert (frames[people] != 255).any()
 
 
-def test_json_events_tell_the_whole_story(studio, mt) -> None:
+def test_json_events_tell_the_whole_story(studio, draft) -> None:
     source, driver, output = studio.source(), studio.driver(5), studio.folder / "out.mp4"
-    result = mt("run", "--source", source, "--driver", driver, "-o", output, "--json")
+    result = draft("--source", source, "--driver", driver, "-o", output, "--json")
     events = [json.loads(line) for line in result.out.splitlines()]
     assert result.err == ""
     names = [event["event"] for event in events]
@@ -279,11 +277,11 @@ def test_json_events_tell_the_whole_story(studio, mt) -> None:
     assert (events[-1]["frame_count"], events[-1]["duration_seconds"]) == (5, pytest.approx(1 / 6))
 
 
-def test_quiet_says_nothing(studio, mt) -> None:
+def test_quiet_says_nothing(studio, draft) -> None:
     frames = studio.walk(3)
     frames[1] = 0
     source, output = studio.source(), studio.folder / "deep/new/out.mp4"
-    result = mt("run", "--source", source, "--driver", studio.driver(frames), "-o", output, "-q")
+    result = draft("--source", source, "--driver", studio.driver(frames), "-o", output, "-q")
     assert (result.code, result.out, result.err) == (0, "", "")
     assert output.stat().st_size > 0
 
@@ -308,6 +306,7 @@ def test_the_same_from_python(studio) -> None:
         frame_rate=30000 / 1001,
         garments=[Garment(photo=shirt, parts=(1, 2))],
         background="black",
+        renderer="texture",
         listener=events.append,
     )
     assert isinstance(report, RenderReport)

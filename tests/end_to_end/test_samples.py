@@ -46,7 +46,7 @@ def dress_colour(dress: Path) -> np.ndarray:
 
 def test_the_dress_walks(samples: Path, dress: Path, tmp_path: Path) -> None:
     driver = samples / "drivers/walk_turn_iuv"
-    report = render_video(dress, driver, tmp_path / "out", frames=(40, 46))
+    report = render_video(dress, driver, tmp_path / "out", frames=(40, 46), renderer="texture")
     assert (report.frame_count, report.width, report.height) == (6, 512, 512)
     for index, picture in enumerate(pictures(report), 40):
         iuv = read_iuv(driver / f"{index:04d}_IUV.png")
@@ -57,7 +57,7 @@ def test_the_dress_walks(samples: Path, dress: Path, tmp_path: Path) -> None:
 
 def test_the_dress_in_other_poses(samples: Path, dress: Path, tmp_path: Path) -> None:
     """A folder that holds photos and silhouettes as well: only its three IUV images are played."""
-    report = render_video(dress, samples / "deepfashion", tmp_path / "out")
+    report = render_video(dress, samples / "deepfashion", tmp_path / "out", renderer="texture")
     assert (report.frame_count, report.width, report.height) == (3, 348, 512)
     drivers = sorted((samples / "deepfashion").glob("*_iuv.png"))
     for picture, driver in zip(pictures(report), drivers, strict=True):
@@ -73,7 +73,9 @@ def test_the_left_man_of_a_crowd_walks(samples: Path, tmp_path: Path) -> None:
     man = isolate(crowd, choose_person(find_people(crowd), "0", "sample"))
     rgb = np.asarray(Image.open(photo).convert("RGB"))
     driver = samples / "drivers/walk_turn_iuv"
-    report = render_video(photo, driver, tmp_path / "out", person="0", frames=(0, 3))
+    report = render_video(
+        photo, driver, tmp_path / "out", person="0", frames=(0, 3), renderer="texture"
+    )
     for index, picture in enumerate(pictures(report)):
         iuv = read_iuv(driver / f"{index:04d}_IUV.png")
         legs = typical_colour(picture, iuv, LEGS)

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 from safetensors.torch import load_file
 
-from motion_transfer.weights import inspect_checkpoint
+from motion_transfer.weights.checkpoint import inspect_checkpoint
 
 pytest.importorskip("accelerate", reason="needs the `train` extra")
 
@@ -149,7 +149,7 @@ def test_clips(studio, mt) -> None:
     ("arguments", "message"),
     [
         (("--data", "nowhere"), "data nowhere does not exist"),
-        (("--init", "lite"), "no weights ship with the program yet"),
+        (("--init", "paper"), "no such weights ship with the program"),
         (("--no-perceptual",), "--sphereface FILE"),
         (("--no-identity", "--perceptual", "vgg19", "--vgg19", "no.pth"), "--no-perceptual"),
         (("--set", "model.image_size=60"), "image_size is 60"),

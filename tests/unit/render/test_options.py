@@ -102,12 +102,11 @@ def options(**changes) -> RenderOptions:
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"renderer": "gan"}, "renderer is 'gan'; supported are texture, nhrr"),
+        ({"renderer": "gan"}, "renderer is 'gan'; supported are nhrr, texture"),
         ({"iuv_order": "bgr"}, "iuv_order is 'bgr'; supported are iuv, vui"),
         ({"source_iuv_order": "bgr"}, "source_iuv_order is 'bgr'"),
         ({"missing": "skip"}, "missing is 'skip'; supported are hold, background, fail"),
         ({"size": "huge"}, "size is 'huge'; supported are driver, crop, even"),
-        ({"renderer": "nhrr"}, "needs --weights"),
         ({"renderer": "texture", "weights": Path("w")}, "uses no weights"),
         ({"workers": 0}, "workers is 0"),
         ({"background": "mauve"}, "background 'mauve'"),
@@ -116,11 +115,3 @@ def options(**changes) -> RenderOptions:
 def test_bad_options(changes: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         options(**changes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "name"),
-    [({}, "texture"), ({"weights": Path("w")}, "nhrr"), ({"renderer": "texture"}, "texture")],
-)
-def test_weights_choose_the_renderer(changes: dict, name: str) -> None:
-    assert options(**changes).renderer_name == name

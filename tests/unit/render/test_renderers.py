@@ -17,7 +17,7 @@ from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.source import Source, prepare_source
 from motion_transfer.render.texture_renderer import TextureRenderer, soften, tabulate_texture
-from motion_transfer.weights import load_checkpoint
+from motion_transfer.weights.checkpoint import load_checkpoint
 
 
 @pytest.fixture

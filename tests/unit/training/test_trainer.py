@@ -14,7 +14,7 @@ from motion_transfer.errors import InputError, OutputError, TrainingError, Weigh
 from motion_transfer.training.config_file import build_config, read_settings
 from motion_transfer.training.events import Logged, TrainResult
 from motion_transfer.training.runs import plan_new_run, plan_resumed_run, prepare
-from motion_transfer.weights import inspect_checkpoint, load_checkpoint
+from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint
 from nhrr_core import VARIANTS
 
 pytest.importorskip("accelerate", reason="needs the `train` extra")
@@ -211,19 +211,24 @@ def test_a_folder_that_is_taken(run: Run, tmp_path: Path) -> None:
         plan_resumed_run(run.folder, {})
 
 
-def test_fine_tuning_starts_from_weights(run: Run, tmp_path: Path, checkpoint: Path) -> None:
-    settings = {k: v for k, v in run.settings.items() if not k.startswith("model.")}
-    tuned = Run(tmp_path / "tuned", settings)
-    tuned.train(**{"run.init": str(checkpoint), "run.steps": 1, "optimiser.learning_rate": 1e-9})
-    ours, theirs = load_file(tuned.folder / "weights.safetensors"), load_file(checkpoint)
-    for name, tensor in theirs.items():
-        if "running" not in name and "batches" not in name:
-            assert torch.allclose(ours[name], tensor, atol=1e-6), name
+def test_runs_on_the_same_photos_may_share_their_textures(run: Run) -> None:
+    shared = run.folder.parent / "shared"
+    settings = {**run.settings, "run.steps": 1, "keeping.textures": str(shared)}
+    Run(run.folder, settings).train()
+    before = {path: path.stat().st_mtime_ns for path in shared.iterdir()}
+    assert before
+    assert not (run.folder / "textures").exists()
+    Run(run.folder.with_name("other"), settings).train()
+    assert {path: path.stat().st_mtime_ns for path in shared.iterdir()} == before
 
 
-def test_no_weights_ship_yet(run: Run) -> None:
-    with pytest.raises(WeightsError, match="no weights ship with the program yet"):
-        plan_new_run(run.folder, {**run.settings, "run.init": "lite"})
+def test_fine_tuning_starts_from_what_ships(run: Run) -> None:
+    shape = {name: value for name, value in run.settings.items() if not name.startswith("model.")}
+    planned = plan_new_run(run.folder, {**shape, "run.init": "lite"})
+    assert planned.init is not None
+    assert planned.config.model == planned.init.config
+    with pytest.raises(WeightsError, match=r"paper: no such weights ship .* start from lite"):
+        plan_new_run(run.folder, {**shape, "run.init": "paper"})
 
 
 def test_a_loss_that_is_no_number_ends_the_run(run: Run) -> None:

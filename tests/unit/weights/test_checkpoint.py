@@ -11,7 +11,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from motion_transfer.errors import WeightsError
-from motion_transfer.weights import inspect_checkpoint, load_checkpoint, save_checkpoint
+from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint, save_checkpoint
 from nhrr_core import ModelConfig
 
 

@@ -1,0 +1,88 @@
+"""The paper's ablation at an equal, small budget: `docs/quality.md` has what this prints.
+
+    mt people render --count 1500 --views 4 --noise --out people/
+    python benchmarks/ablation.py --people-cache people/ -o ablation/ [--steps 300] [--pairs 200]
+
+Trains the five variants one after the other, each with the same seed, people, steps and losses (but
+for those that a variant does not have), at 128 x 128, then scores them on held-out people at that
+size. Started again, it goes on where it was stopped.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from motion_transfer.cli.main import main as mt
+from motion_transfer.weights.checkpoint import (
+    inspect_checkpoint,
+    load_checkpoint,
+    save_checkpoint,
+)
+from nhrr_core import VARIANTS, ModelConfig, NeuralReRenderer
+
+SIDE = 128
+SETTINGS = {
+    "model.alpha": "true",
+    "losses.identity": "none",
+    "losses.adversarial": "false",
+    "optimiser.learning_rate": 4e-4,
+    "optimiser.ema_decay": 0.99,
+    "optimiser.half_size": 1,
+    "data.noise": 0.5,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--people-cache", type=Path, required=True)
+    parser.add_argument("--steps", type=int, default=300)
+    parser.add_argument("--pairs", type=int, default=200)
+    arguments = parser.parse_args()
+    arguments.output.mkdir(exist_ok=True)
+    weights = []
+    for variant in VARIANTS:
+        run = arguments.output / variant
+        train(run, variant, arguments.people_cache, arguments.steps)
+        weights.append(arguments.output / f"{variant}.safetensors")
+        halve(run / "weights.safetensors", weights[-1])
+    call(
+        *("eval", "--protocol", "people", "--limit", arguments.pairs, "--size", f"{SIDE}x{SIDE}"),
+        *("--weights", *weights, "--renderer", "texture"),
+        *("-o", arguments.output / "scores", "--force"),
+    )
+
+
+def train(run: Path, variant: str, people: Path, steps: int) -> None:
+    """Train one variant, or go on with it."""
+    if run.exists():
+        call("train", "--resume", run, "--steps", steps)
+        return
+    count = sum(1 for entry in people.iterdir() if entry.is_dir())
+    settings = {**SETTINGS, "keeping.textures": run.with_name("textures")}
+    call(
+        *("train", "--preset", "lite", "--variant", variant, "--steps", steps, "-o", run),
+        *("--data", "people", "--people", count, "--people-cache", people),
+        *(f"--set={name}={value}" for name, value in settings.items()),
+    )
+
+
+def halve(trained: Path, output: Path) -> None:
+    """The same weights, for the size that they were trained at."""
+    config = inspect_checkpoint(trained).config
+    halved: ModelConfig = replace(config, image_size=SIDE, texture_size=SIDE)
+    model = NeuralReRenderer(halved)
+    model.load_state_dict(load_checkpoint(trained).state_dict())
+    save_checkpoint(output, model, notes=inspect_checkpoint(trained).notes)
+
+
+def call(*words: object) -> None:
+    """`mt`, which says itself what went wrong."""
+    if code := mt([str(word) for word in words]):
+        raise SystemExit(code)
+
+
+if __name__ == "__main__":
+    main()

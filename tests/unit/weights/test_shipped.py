@@ -1,0 +1,50 @@
+"""The checkpoints that ship: small, whole, and with their papers."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+import torch
+
+from motion_transfer.errors import WeightsError
+from motion_transfer.weights import shipped as module
+from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint
+from motion_transfer.weights.shipped import DEFAULT_WEIGHTS, SHIPPED, find_weights
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_they_load_and_say_what_they_are(name: str) -> None:
+    path = find_weights(Path(name))
+    info = inspect_checkpoint(path)
+    assert path.stat().st_size < 40e6
+    assert info.notes["licence"] == "CC0-1.0"
+    assert "synthetic people" in info.notes["data"]
+    recipe = tomllib.loads(info.notes["train.toml"])
+    assert recipe["data"]["people_cache"] == ""
+    assert 0 < int(info.notes["step"]) <= recipe["run"]["steps"]
+    model = load_checkpoint(path)
+    assert all(value.dtype == torch.float32 for value in model.parameters())
+    assert all(bool(value.isfinite().all()) for value in model.parameters())
+
+
+def test_the_default_has_alpha_and_the_recipe_is_in_the_docs() -> None:
+    path = find_weights(DEFAULT_WEIGHTS)
+    info = inspect_checkpoint(path)
+    assert (info.config.variant, info.config.alpha, info.config.image_size) == ("full", True, 256)
+    recipe = Path(__file__).parents[3] / "docs" / "weights" / f"{DEFAULT_WEIGHTS}.toml"
+    assert recipe.read_text() == info.notes["train.toml"]
+
+
+def test_a_path_is_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert find_weights(tmp_path / "mine.safetensors") == tmp_path / "mine.safetensors"
+    monkeypatch.chdir(tmp_path)
+    Path("lite").touch()
+    assert find_weights(Path("lite")) == Path("lite")
+
+
+def test_a_package_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "SHIPPED", ("lite", "lost"))
+    with pytest.raises(WeightsError, match=r"lost should have come .* --renderer texture"):
+        find_weights(Path("lost"))
