@@ -23,8 +23,10 @@ from nhrr_core.iuv import PART_COUNT, PART_NAMES
 
 SMALLEST_VISIBLE_SHARE = 0.01  # of the texels; a frontal half-length portrait shows about 0.2
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
+CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
+SOLID_ALPHA = 192  # of 255; less is mixed with the background
 GRABCUT_ROUNDS = 3
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
 
@@ -73,9 +75,19 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
 
 
 def unfold(
-    photo: Photo, iuv: UInt8[np.ndarray, "H W 3"], parts: tuple[int, ...], texture_size: int
+    photo: Photo,
+    iuv: UInt8[np.ndarray, "H W 3"],
+    parts: tuple[int, ...],
+    texture_size: int,
+    *,
+    alpha: UInt8[np.ndarray, "H W"] | None = None,
 ) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
-    """Partial texture in [-1, 1] and visibility of some parts of a photo at its full resolution."""
+    """Partial texture in [-1, 1] and visibility of some parts of a photo at its full resolution.
+
+    Args:
+        alpha: says where the person ends; None: the photo's own alpha, or else its colours.
+    """
+    alpha = photo.alpha if alpha is None else alpha
     rows, columns = (np.flatnonzero(iuv[..., 0].any(axis)) for axis in (1, 0))
     if not len(rows):
         blank = torch.zeros(1, 1, texture_size, texture_size)
@@ -86,11 +98,22 @@ def unfold(
         max(0, columns[0] - margin) : columns[-1] + 1 + margin,
     ]
     rgb, own = np.ascontiguousarray(photo.rgb[body]), np.ascontiguousarray(iuv[body])
-    tensors = [
-        torch.from_numpy(image).permute(2, 0, 1)[None] for image in (rgb, trim_outline(rgb, own))
-    ]
+    trimmed = trim_outline(rgb, own) if alpha is None else trim_to_alpha(own, alpha[body])
+    tensors = [torch.from_numpy(image).permute(2, 0, 1)[None] for image in (rgb, trimmed)]
     colours, body_iuv = tensors[0].float() / 127.5 - 1, keep_parts(tensors[1], parts)
     return extract_texture(colours, body_iuv, load_uv_layout().charts, texture_size)
+
+
+def trim_to_alpha(
+    iuv: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """The IUV where alpha is solid, without the outermost pixels, where photo and outline mix."""
+    rows = np.flatnonzero(iuv[..., 0].any(1))
+    if not len(rows):
+        return iuv
+    solid = (alpha >= SOLID_ALPHA).astype(np.uint8)
+    height = int(rows[-1] - rows[0] + 1)
+    return iuv * cv2.erode(solid, disc(height * TRIM_SHARE), borderValue=1)[..., None]
 
 
 def trim_outline(
@@ -99,7 +122,8 @@ def trim_outline(
     """The IUV without the background that strays into its outline.
 
     Only a band along the outline is doubted. In it, GrabCut (Rother et al., SIGGRAPH 2004) decides
-    by colour, and the outermost pixels, where photo and outline mix, always go.
+    by colour, and the outermost pixels, where photo and outline mix, always go. What lies just
+    outside may be hair: the background's colours are those farther away.
     """
     mask = occupancy(iuv)
     rows = np.flatnonzero(mask.any(1))
@@ -125,15 +149,29 @@ def _cut_out(
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 3)
     thickness = cv2.dilate(depth, disc(band))
     inner = depth >= np.minimum(band, thickness / 2)  # a limb thinner than the band keeps its core
-    outer = cv2.dilate(mask, disc(band))
-    if outer.all():
+    near = cv2.dilate(mask, disc(height * CLEAR_SHARE))
+    if near.all():
         return mask
-    labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[inner & (mask > 0)], labels[outer == 0] = cv2.GC_FGD, cv2.GC_BGD
+    labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
+    labels[inner & (mask > 0)] = cv2.GC_FGD
+    surroundings = np.where(mask[..., None], rgb, _spread(rgb, near))
     cv2.setRNGSeed(0)  # GrabCut starts from k-means
     models = np.zeros((1, 65)), np.zeros((1, 65))
-    cv2.grabCut(rgb, labels, (0, 0, 1, 1), *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
+    cv2.grabCut(surroundings, labels, (0, 0, 1, 1), *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
     return labels & 1  # the odd labels, GC_FGD and GC_PR_FGD, are the person
+
+
+def _spread(
+    rgb: UInt8[np.ndarray, "H W 3"], unknown: UInt8[np.ndarray, "H W"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Each unknown pixel takes the colour of the nearest known one."""
+    _, nearest = cv2.distanceTransformWithLabels(
+        unknown, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    known = np.flatnonzero(unknown.ravel() == 0)
+    colours = np.zeros((nearest.max() + 1, 3), np.uint8)
+    colours[nearest.ravel()[known]] = rgb.reshape(-1, 3)[known]
+    return colours[nearest]
 
 
 def _unfold_garment(

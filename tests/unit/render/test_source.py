@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.image import Photo
 from motion_transfer.render.options import Garment, RenderOptions, parse_parts
-from motion_transfer.render.source import Source, prepare_source, trim_outline
+from motion_transfer.render.source import (
+    SOLID_ALPHA,
+    Source,
+    prepare_source,
+    trim_outline,
+    trim_to_alpha,
+    unfold,
+)
 from nhrr_core import load_uv_layout
 
 SIZE = 64
@@ -51,6 +60,36 @@ def test_an_outline_that_strays_is_trimmed(studio) -> None:
     person = true[..., 0] > 0
     assert (trimmed & ~person).sum() < 0.01 * ((rough[..., 0] > 0) & ~person).sum()
     assert trimmed.sum() > 0.9 * person.sum()
+
+
+def test_hair_that_leaves_the_outline_stays_in_it(studio) -> None:
+    """Hair lies over the head's outline, on both sides; it is no background for that."""
+    iuv = studio.iuv(scale=4, size=(384, 256))
+    photo = studio.dress(iuv)
+    head = np.isin(iuv[..., 0], HEAD).astype(np.uint8)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (17, 17))
+    hair = (cv2.dilate(head, disc) - cv2.erode(head, disc[3:-3, 3:-3])) > 0
+    hair &= (head > 0) | (iuv[..., 0] == 0)
+    photo[hair] = (40, 30, 20)
+    trimmed = trim_outline(photo, iuv)[..., 0] > 0
+    assert trimmed[hair & (head > 0)].mean() > 0.6
+
+
+def test_alpha_says_where_the_person_ends(studio) -> None:
+    """Backdrop and person in one colour: only alpha can tell; the solid part of it counts."""
+    iuv = studio.iuv(scale=4, size=(384, 256))
+    person = iuv[..., 0] > 0
+    alpha = person.astype(np.uint8) * 255
+    columns = np.flatnonzero(person.any(0))
+    middle = (columns.min() + columns.max()) // 2
+    alpha[:, middle:] = np.where(person[:, middle:], SOLID_ALPHA - 1, 0)
+    trimmed = trim_to_alpha(iuv, alpha)[..., 0] > 0
+    assert not trimmed[:, middle - 1 :].any()
+    assert trimmed[:, :middle].sum() > 0.9 * person[:, :middle].sum()
+    photo = Photo(Path("a.png"), np.full((*alpha.shape, 3), 99, np.uint8), alpha, turned=False)
+    parts = tuple(np.unique(iuv[person][:, 0]).tolist())
+    seen = unfold(photo, iuv, parts, SIZE)[1].sum()
+    assert 0 < seen < unfold(photo, iuv, parts, SIZE, alpha=np.full_like(alpha, 255))[1].sum()
 
 
 @pytest.mark.parametrize("word", ["IUV", "iuv"])
