@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from motion_transfer.batch.events import BatchFinished, BatchListener, BatchStarted
-from motion_transfer.batch.expand import Job, check_inputs, expand
+from motion_transfer.batch.expand import Job, check_inputs, expand, find_output_root
 from motion_transfer.batch.manifest import Manifest
 from motion_transfer.batch.manifest_file import ManifestError, read_manifest
 from motion_transfer.batch.report import write_report
 from motion_transfer.batch.schedule import Scheduler, Tally
-from motion_transfer.batch.state import BatchState
+from motion_transfer.batch.state import TO_DO, BatchState
 from motion_transfer.batch.workers import LocalWorkers, Workers
 from motion_transfer.errors import InputError
+from motion_transfer.media.publish import explain_disk_errors
 
 ENGINES = ("local", "ray")
 MOST_PROBLEMS = 10
@@ -65,19 +66,14 @@ class Batch:
     manifest: Manifest
     jobs: list[Job]
     state: BatchState
-    output_root: Path
     path: Path
-
-    @property
-    def report_folder(self) -> Path:
-        return self.output_root / f"{self.path.stem}.report"
 
 
 def read_batch(path: Path, settings: Sequence[str] = ()) -> Batch:
     """Read a manifest and lay out its jobs. Raises: ManifestError."""
     manifest, text = read_manifest(path, settings)
-    root = path.absolute().parent / manifest.output_root
-    return Batch(manifest, expand(manifest, text), BatchState(path, root), root, path)
+    root = find_output_root(manifest, path)
+    return Batch(manifest, expand(manifest, text), BatchState(path, root), path)
 
 
 def validate(batch: Batch) -> None:
@@ -98,7 +94,7 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
     began = time.monotonic()
     batch = read_batch(options.manifest, options.settings)
     jobs = _choose(batch.jobs, options)
-    with batch.state.held():
+    with explain_disk_errors(batch.state.folder), batch.state.held():
         if options.restart:
             batch.state.forget()
         workers = _open_workers(options, batch.state.scratch)
@@ -113,20 +109,15 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
         )
         listener(BatchStarted(len(jobs), workers.count))
         with _interrupts(scheduler) as interrupts:
-            try:
-                tally = scheduler.run()
-            except BaseException:
-                workers.stop(now=True)
-                raise
-            workers.stop(now=False)
-        write_report(batch.report_folder, batch.jobs, batch.state)
-    listener(
-        BatchFinished(
-            *(tally.done, tally.current, tally.failed, tally.left),
-            time.monotonic() - began,
-            scheduler.feature_maps,
+            tally = scheduler.run()
+        listener(
+            BatchFinished(
+                *(tally.done, tally.current, tally.failed, tally.left),
+                time.monotonic() - began,
+                scheduler.feature_maps,
+            )
         )
-    )
+        write_report(batch.jobs, batch.state)
     if interrupts:
         raise KeyboardInterrupt
     return tally
@@ -134,10 +125,9 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
 
 def status(batch: Batch) -> dict[str, int]:
     """How many jobs are done, failed and not begun, as far as was noted."""
-    counts = {"done": 0, "failed": 0, "to do": 0}
+    counts = {"done": 0, "failed": 0, TO_DO: 0}
     for job in batch.jobs:
-        record = batch.state.records.get(str(job.options.output), {})
-        counts[record.get("status", "to do")] += 1
+        counts[batch.state.status_of(job.options.output)] += 1
     return counts
 
 
@@ -168,12 +158,12 @@ def _default_count() -> int:
 
 @contextmanager
 def _interrupts(scheduler: Scheduler) -> Iterator[list[Any]]:
-    """The first Ctrl-C lets running chunks finish, the second stops now."""
+    """The first Ctrl-C lets running chunks finish; one while they do stops now."""
     heard: list[Any] = []
 
     def hear(number: int, _frame: Any) -> None:
         heard.append(number)
-        if len(heard) > 1:
+        if scheduler.halted:
             raise KeyboardInterrupt
         scheduler.halt()
 
