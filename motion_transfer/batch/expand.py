@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -84,15 +83,15 @@ def expand(manifest: Manifest, text: ManifestText) -> list[Job]:
 
 def _check_nesting(places: dict[str, Place], text: ManifestText) -> None:
     """Raises: ManifestError for an output inside another one, which is a folder of frames."""
-    for folder in {os.path.dirname(output) for output in places}:
-        inner = folder
-        while folder not in places and folder != os.path.dirname(folder):
-            folder = os.path.dirname(folder)
-        if folder in places:
-            place = next(p for output, p in places.items() if os.path.dirname(output) == inner)
+    folders = {output.rpartition("/")[0]: place for output, place in places.items()}
+    for folder, place in folders.items():
+        parts = folder.split("/")
+        above = ("/".join(parts[:count]) for count in range(2, len(parts) + 1))
+        outer = next((path for path in above if path in places), None)
+        if outer is not None:
             raise ManifestError(
-                f"{text.where((*place, 'output'))}: lies in {folder}, the output of"
-                f" {text.where(places[folder])}; choose another folder"
+                f"{text.where((*place, 'output'))}: lies in {outer}, the output of"
+                f" {text.where(places[outer])}; choose another folder"
             )
 
 
@@ -191,16 +190,17 @@ class _Spread:
             raise ManifestError(
                 f"{self._text.where(place)}: {template!r} is no template; known are {PLACEHOLDERS}"
             ) from None
-        path = os.path.join(self._root, written.rstrip("/"))
-        folder, name = os.path.split(path)
+        path = f"{self._root}/{written.rstrip('/')}"
+        folder, _, name = path.rpartition("/")
         if folder not in self._real_folders:
             real = Path(folder).resolve()
             inside = real.is_relative_to(self._real_root) and ".." not in Path(written).parts
             self._real_folders[folder] = str(real), inside and not written.startswith("/")
         real_folder, inside = self._real_folders[folder]
         if self._manifest.outside_outputs:
-            return _Output(path, os.path.realpath(path), written)
-        if not inside or name in ("", ".", "..") or os.path.islink(path):
+            path = str(self._root / written)
+            return _Output(path, str(Path(path).resolve()), written)
+        if not inside or name in ("", ".", "..") or Path(path).is_symlink():
             raise ManifestError(
                 f"{self._text.where(place)}: {written!r} leaves the output root {self._root}; write"
                 " a path below it, or set outside_outputs: true"

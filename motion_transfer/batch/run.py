@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from motion_transfer.batch.events import BatchFinished, BatchListener, BatchStarted
 from motion_transfer.batch.expand import Job, check_inputs, expand, find_output_root
@@ -59,6 +59,17 @@ class BatchOptions:
             raise InputError("--address is of a Ray cluster; add --engine ray")
 
 
+class Haltable(Protocol):
+    """What Ctrl-C is for: a scheduler."""
+
+    @property
+    def halted(self) -> bool: ...
+
+    def halt(self) -> None:
+        """Begin nothing new."""
+        ...
+
+
 @dataclass(frozen=True)
 class Batch:
     """A manifest that was read."""
@@ -93,7 +104,7 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
     """
     began = time.monotonic()
     batch = read_batch(options.manifest, options.settings)
-    jobs = _choose(batch.jobs, options)
+    jobs = choose_jobs(batch.jobs, options)
     with explain_disk_errors(batch.state.folder), batch.state.held():
         if options.restart:
             batch.state.forget()
@@ -108,7 +119,7 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
             listener=listener,
         )
         listener(BatchStarted(len(jobs), workers.count))
-        with _interrupts(scheduler) as interrupts:
+        with heed_interrupts(scheduler) as interrupts:
             tally = scheduler.run()
         listener(
             BatchFinished(
@@ -131,7 +142,8 @@ def status(batch: Batch) -> dict[str, int]:
     return counts
 
 
-def _choose(jobs: list[Job], options: BatchOptions) -> list[Job]:
+def choose_jobs(jobs: list[Job], options: BatchOptions) -> list[Job]:
+    """The jobs that the options name. Raises: InputError if there are none."""
     start, stop = options.chosen
     chosen = jobs[slice(start, stop)]
     if not chosen:
@@ -157,9 +169,12 @@ def _default_count() -> int:
 
 
 @contextmanager
-def _interrupts(scheduler: Scheduler) -> Iterator[list[Any]]:
-    """The first Ctrl-C lets running chunks finish; one while they do stops now."""
-    heard: list[Any] = []
+def heed_interrupts(scheduler: Haltable) -> Iterator[list[int]]:
+    """The first Ctrl-C lets running chunks finish; one while they do stops now.
+
+    Yields: the signals that were heard.
+    """
+    heard: list[int] = []
 
     def hear(number: int, _frame: Any) -> None:
         heard.append(number)

@@ -116,7 +116,7 @@ def begin_worker(place: int, count: int, path: list[str]) -> None:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Processes that begin inside never hear Ctrl-C, which is the scheduler's; it hears it after."""
+    """Processes that begin inside never hear Ctrl-C: it is the scheduler's, who hears it after."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
