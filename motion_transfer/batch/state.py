@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -63,15 +63,15 @@ class BatchState:
 
         Outputs stay, and so does the report. Raises: OutputError while somebody is at work.
         """
-        left = [output for output in outputs if work_path(output).exists()]
-        for output in left:
-            with WorkFolder(output) as work:
-                work.clear()
-        if not self.folder.exists():
-            return len(left)
-        with self.held():
+        is_there = self.folder.exists()
+        with self.held() if is_there else nullcontext():
+            left = [output for output in outputs if work_path(output).exists()]
+            for output in left:
+                with WorkFolder(output) as work:
+                    work.clear()
             try:
-                shutil.rmtree(self.folder)
+                if is_there:
+                    shutil.rmtree(self.folder)
             except OSError as error:
                 raise OutputError(f"cannot remove {self.folder}: {error.strerror}") from error
-        return len(left) + 1
+        return len(left) + is_there
