@@ -114,7 +114,7 @@ class ManifestText:
             if len(lines) == MOST_ERRORS:
                 lines[f"and {len(details) - number} more"] = None
                 break
-            setting = next((given[step] for step in detail["loc"] if step in given), None)
+            setting = next((given[s] for s in map(str, detail["loc"]) if s in given), None)
             if setting is None:
                 lines[self._sentence(detail)] = None
             else:
