@@ -1,12 +1,14 @@
-"""Batches: the engine over the bare model, shared sources, memory, and large manifests.
+"""Batches: the engine over the bare model, shared sources, memory, workers, large manifests.
 
-    python benchmarks/batch.py [--frames 96] [--preset lite] [--only manifest]
+    python benchmarks/batch.py [--only manifest] [--frames 96] [--preset lite] [--quick]
 
 Prints, each against its own baseline:
-* `overhead`: rendering chunks (decode, model, paste, encode) over the model alone, one worker;
+* `manifest`: reading and checking 10,000 jobs, and how long until the first of them begins;
 * `shared`: feature maps computed for 20 jobs of one source;
-* `memory`: peak of the scheduler and of a worker, at 1 and 8 times the frames and the jobs;
-* `manifest`: reading and checking 10,000 jobs, and how long until the first of them begins.
+* `overhead`: rendering chunks (decode, model, paste, encode) over the model alone, one worker;
+* `workers`: frames a second of the network, by how the cores are shared out between workers and
+  their threads; decides the default number of workers;
+* `memory`: peak of the scheduler and of a worker, at 1 and 8 times the frames and the jobs.
 """
 
 from __future__ import annotations
@@ -19,46 +21,120 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
+from typing import Any
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, before torch
 
 from workload import SOURCE, driver_folder, random_checkpoint
 
 MT = [sys.executable, "-m", "motion_transfer", "batch"]
+JOBS = 10_000
 CHILD = """
-import json, resource, sys
+import json, resource, sys, time
 from pathlib import Path
-from motion_transfer.batch.events import BatchFinished
+from motion_transfer.batch.events import BatchFinished, JobFrames
 from motion_transfer.batch.run import BatchOptions, run_batch
 told = []
-run_batch(BatchOptions(manifest=Path(sys.argv[1]), workers=1), told.append)
-end = next(event for event in told if isinstance(event, BatchFinished))
+listener = lambda event: told.append((time.perf_counter(), event))
+run_batch(BatchOptions(manifest=Path(sys.argv[1]), workers=int(sys.argv[2])), listener)
+end = next(event for _, event in told if isinstance(event, BatchFinished))
+drawn = [(moment, event.frame_count) for moment, event in told if isinstance(event, JobFrames)]
 peaks = [resource.getrusage(who).ru_maxrss // 1024
          for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-print(json.dumps([end.done_count, end.feature_maps, *peaks]))
+later = sum(count for moment, count in drawn if moment > drawn[0][0])
+print(json.dumps({"done": end.done_count, "maps": end.feature_maps, "scheduler": peaks[0],
+                  "worker": peaks[1], "rate": later / max(1e-9, drawn[-1][0] - drawn[0][0])}))
 """
 
 
-def write_manifest(folder: Path, name: str, driver: Path, jobs: int) -> Path:
-    path = folder / f"{name}.json"
+@dataclass(frozen=True)
+class Sizes:
+    """How much is measured."""
+
+    frames: int
+    rounds: int
+    preset: str
+    quick: bool
+
+
+def write_manifest(
+    folder: Path, name: str, driver: Path, jobs: int, *, suffix: str = ".json", **defaults: Any
+) -> Path:
+    """A manifest of jobs of one source and driver; with the draft renderer if none is named."""
+    path = folder / f"{name}{suffix}"
     entries = [
         {"source": str(SOURCE), "driver": str(driver), "output": f"{name}/{index}.mp4"}
         for index in range(jobs)
     ]
-    path.write_text(json.dumps({"version": 1, "jobs": entries}))
+    content = {"version": 1, "defaults": {"renderer": "texture", **defaults}, "jobs": entries}
+    if suffix == ".json":
+        path.write_text(json.dumps(content))
+    else:
+        import yaml
+
+        path.write_text(yaml.safe_dump(content))
     return path
 
 
-def run_manifest(path: Path) -> list[int]:
-    """Jobs done, feature maps, and the peaks of scheduler and worker in MiB."""
-    result = subprocess.run(
-        [sys.executable, "-c", CHILD, str(path)], check=True, capture_output=True, text=True
-    )
+def run_manifest(path: Path, workers: int = 1) -> dict[str, Any]:
+    """Jobs done, feature maps, peaks of scheduler and worker in MiB, frames/s after the first."""
+    command = [sys.executable, "-c", CHILD, str(path), str(workers)]
+    result = subprocess.run(command, check=True, capture_output=True, text=True)
     return json.loads(result.stdout.splitlines()[-1])
 
 
-def overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> None:
+def manifest(folder: Path, sizes: Sizes) -> None:
+    def cpu_seconds() -> float:
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+
+    for suffix in (".json", ".yaml"):
+        path = write_manifest(folder, "large", driver_folder(folder, 8), JOBS, suffix=suffix)
+        walls, used = [], []
+        for _ in range(sizes.rounds):
+            before, began = cpu_seconds(), time.perf_counter()
+            subprocess.run([*MT, "validate", str(path)], check=True, capture_output=True)
+            walls.append(time.perf_counter() - began)
+            used.append(cpu_seconds() - before)
+        print(
+            f"manifest: {JOBS} jobs{suffix} validate in {median(walls):.1f} s, median"
+            f" ({min(walls):.1f} to {max(walls):.1f}; {median(used):.1f} s of a core)",
+            flush=True,
+        )
+    moments: dict[str, list[float]] = {"batchstarted": [], "jobplanned": []}
+    for _ in range(sizes.rounds):
+        began = time.perf_counter()
+        command = [*MT, "run", str(folder / "large.json"), "--json", "--workers", "1"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            if process.stdout is None:
+                raise RuntimeError("no pipe")
+            for line in process.stdout:
+                kind = json.loads(line)["event"]
+                if kind in moments:
+                    moments[kind].append(time.perf_counter() - began)
+                if kind == "jobplanned":
+                    process.kill()
+                    break
+    print(
+        f"manifest: {JOBS} jobs start after {median(moments['batchstarted']):.1f} s, median; the"
+        f" first is planned after {median(moments['jobplanned']):.1f} s",
+        flush=True,
+    )
+
+
+def shared(folder: Path, sizes: Sizes) -> None:
+    weights = str(random_checkpoint(folder, sizes.preset))
+    network = {"renderer": "nhrr", "weights": weights, "compile": False, "frames": "0"}
+    driver = driver_folder(folder, 8)
+    told = run_manifest(write_manifest(folder, "shared", driver, 20, suffix=".json", **network))
+    print(f"shared: {told['done']} jobs of one source, {told['maps']} feature map", flush=True)
+
+
+def overhead(folder: Path, sizes: Sizes) -> None:
     import numpy as np
 
     from motion_transfer.render.engine import TURN_TAKERS, Engine
@@ -68,64 +144,87 @@ def overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> None:
 
     options = RenderOptions(
         source=SOURCE,
-        driver=driver_folder(folder, frame_count),
+        driver=driver_folder(folder, sizes.frames),
         output=folder / "overhead.mp4",
-        weights=random_checkpoint(folder, preset),
-        compile=True,
+        renderer="nhrr",
+        weights=random_checkpoint(folder, sizes.preset),
+        compile=not sizes.quick,
     )
     prepared, appearance = prepare(options, ignore)
     renderer, reader = prepared.recipe.renderer(appearance), prepared.driver.open()
-    crops = np.stack([prepared.plan.window.cut(iuv, 256) for iuv in reader.read(0, 4)])
-    ratios = []
-    for index in range(rounds):
+    side = renderer.working_size(prepared.plan.window.side)
+    iuv = reader.read(0, renderer.batch_size)
+    crops = np.stack([prepared.plan.window.cut(frame, side) for frame in iuv])
+    renderer.render(crops)
+    ratios, rates = [], []
+    for index in range(sizes.rounds):
         began = time.perf_counter()
-        for _ in range(frame_count // len(crops)):
-            renderer.render(crops)
+        for chunk in prepared.plan.chunks:
+            for _ in range(chunk.start, chunk.stop, len(crops)):
+                renderer.render(crops)
         alone = time.perf_counter() - began
         began = time.perf_counter()
         engine = Engine(prepared, reader=reader, renderer=renderer)
         chunks = [(c, folder / f"{index}-{c.index}.nut") for c in prepared.plan.chunks]
         engine.render(chunks, TURN_TAKERS, lambda _chunk, _path: None)
         ratios.append((time.perf_counter() - began) / alone)
-    ratios.sort()
+        rates.append(sizes.frames / alone)
     print(
-        f"overhead, {preset}: engine over model alone, median {ratios[len(ratios) // 2]:.3f}"
-        f" ({ratios[0]:.3f} to {ratios[-1]:.3f})"
+        f"overhead, {sizes.preset}: engine over model alone ({median(rates):.1f} frames/s), median"
+        f" {median(ratios):.3f} ({min(ratios):.3f} to {max(ratios):.3f})",
+        flush=True,
     )
 
 
-def shared(folder: Path) -> None:
-    done, maps, *_ = run_manifest(write_manifest(folder, "shared", driver_folder(folder, 8), 20))
-    print(f"shared: {done} jobs of one source, {maps} feature map")
+def workers(folder: Path, sizes: Sizes) -> None:
+    cores = len(os.sched_getaffinity(0))
+    weights = str(random_checkpoint(folder, sizes.preset))
+    network = {"renderer": "nhrr", "weights": weights, "compile": not sizes.quick}
+    counts = [count for count in (1, 2, 4, 8, 16, 32) if count <= cores]
+    driver = driver_folder(folder, sizes.frames)
+    rates: dict[int, list[float]] = {count: [] for count in counts}
+    for turn in range(sizes.rounds):
+        for count in counts:
+            name = f"workers{count}_{turn}"
+            path = write_manifest(folder, name, driver, 2 * cores, **network)
+            rates[count].append(run_manifest(path, count)["rate"])
+    for count in counts:
+        rate = median(rates[count])
+        print(
+            f"workers, {sizes.preset}: {count} x {max(1, cores // count)} threads:"
+            f" {rate:.1f} frames/s, {rate / median(rates[1]):.2f} times one worker's",
+            flush=True,
+        )
 
 
-def memory(folder: Path) -> None:
-    for name, frames, jobs in (("once", 96, 4), ("frames", 768, 4), ("jobs", 96, 32)):
+def memory(folder: Path, sizes: Sizes) -> None:
+    base: dict[str, int] = {}
+    few, many = (1, 2) if sizes.quick else (4, 32)
+    for name, frames, jobs in (
+        ("once", sizes.frames, few),
+        ("frames", 8 * sizes.frames, few),
+        ("jobs", sizes.frames, many),
+    ):
         path = write_manifest(folder, name, driver_folder(folder, frames), jobs)
-        _, _, scheduler, worker = run_manifest(path)
-        print(f"memory: {jobs} jobs of {frames} frames: scheduler {scheduler}, worker {worker} MiB")
+        told = run_manifest(path)
+        base = base or told
+        print(
+            f"memory: {jobs} jobs of {frames} frames: "
+            + ", ".join(
+                f"{who} {told[who]} MiB ({told[who] / base[who]:.2f} times)"
+                for who in ("scheduler", "worker")
+            ),
+            flush=True,
+        )
 
 
-def manifest(folder: Path) -> None:
-    path = write_manifest(folder, "large", driver_folder(folder, 8), 10_000)
-
-    def cpu_seconds() -> float:
-        used = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return used.ru_utime + used.ru_stime
-
-    before, began = cpu_seconds(), time.perf_counter()
-    subprocess.run([*MT, "validate", str(path)], check=True, capture_output=True)
-    wall, used = time.perf_counter() - began, cpu_seconds() - before
-    print(f"manifest: 10,000 jobs validate in {wall:.1f} s ({used:.1f} s of a core)")
-    began = time.perf_counter()
-    with subprocess.Popen(
-        [*MT, "run", str(path), "--json", "--workers", "1"], stdout=subprocess.PIPE, text=True
-    ) as process:
-        if process.stdout is None:
-            raise RuntimeError("no pipe")
-        process.stdout.readline()
-        print(f"manifest: work begins after {time.perf_counter() - began:.1f} s")
-        process.kill()
+PARTS: dict[str, Callable[[Path, Sizes], None]] = {
+    "manifest": manifest,
+    "shared": shared,
+    "overhead": overhead,
+    "workers": workers,
+    "memory": memory,
+}
 
 
 def main() -> None:
@@ -133,21 +232,15 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=96)
     parser.add_argument("--preset", default="lite")
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--only", choices=("overhead", "shared", "memory", "manifest"))
-    arguments = parser.parse_args()
+    parser.add_argument("--quick", action="store_true", help="once, little, and not compiled")
+    parser.add_argument("--only", choices=tuple(PARTS))
+    given = parser.parse_args()
+    frames, rounds = (8, 1) if given.quick else (given.frames, given.rounds)
+    sizes = Sizes(frames, rounds, given.preset, given.quick)
     with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        parts = {
-            "manifest": lambda: manifest(folder),
-            "shared": lambda: shared(folder),
-            "overhead": lambda: overhead(
-                folder, arguments.frames, arguments.preset, arguments.rounds
-            ),
-            "memory": lambda: memory(folder),
-        }
-        for name, part in parts.items():
-            if arguments.only in (None, name):
-                part()
+        for name, part in PARTS.items():
+            if given.only in (None, name):
+                part(Path(temporary), sizes)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Literal
 
 from motion_transfer.batch.expand import Job
@@ -18,17 +19,20 @@ Stage = Literal["begun", "preparing", "rendering", "assembling", "ended"]
 
 def scan_name(options: RenderOptions) -> str:
     """Jobs of one name share a look at their driver."""
-    words = (options.driver, options.missing, options.iuv_order, options.frames)
-    return "scan-" + key_of({"scan": words})[:32]
+    return _name("scan", options.driver, options.missing, options.iuv_order, options.frames)
 
 
 def look_name(options: RenderOptions) -> str:
     """Jobs of one name share a source's appearance: the feature map."""
-    words = (
-        *(options.source, options.source_iuv, options.source_iuv_order, options.person),
+    return _name(
+        *("look", options.source, options.source_iuv, options.source_iuv_order, options.person),
         *(options.garments, options.renderer, options.weights),
     )
-    return "look-" + key_of({"look": words})[:32]
+
+
+@cache
+def _name(kind: str, *words: object) -> str:
+    return f"{kind}-{key_of({kind: words})[:32]}"
 
 
 @dataclass

@@ -15,7 +15,7 @@ from motion_transfer.batch.manifest_file import ManifestError, ManifestText, Pla
 from motion_transfer.errors import InputError
 from motion_transfer.people.motion_name import is_motion
 from motion_transfer.render.option import list_options
-from motion_transfer.render.options import NO_AUDIO, RenderOptions, options_from_words
+from motion_transfer.render.options import NO_AUDIO, RenderOptions, parse_word
 from motion_transfer.weights.shipped import SHIPPED, find_weights
 
 OPTIONS = {entry.word: entry for entry in list_options(RenderOptions)}
@@ -40,41 +40,70 @@ class Job:
     options: RenderOptions
 
 
-def expand(manifest: Manifest, text: ManifestText, *, output_root: Path | None = None) -> list[Job]:
+@dataclass(frozen=True)
+class _Output:
+    """A file that a job writes: its path, what no other job may write, and its manifest's word."""
+
+    path: str
+    real: str
+    written: str
+
+
+def find_output_root(manifest: Manifest, path: Path) -> Path:
+    """The folder below which the outputs of the manifest at `path` lie; absolute."""
+    root = path.absolute().parent / manifest.output_root
+    return root.resolve() if ".." in root.parts else root
+
+
+def expand(manifest: Manifest, text: ManifestText) -> list[Job]:
     """Every job, in order.
 
     Raises: ManifestError for a glob without a match, a template that is none, two jobs with one
         output, an output outside the root, or options that do not go together.
     """
-    folder = text.path.absolute().parent
-    root = output_root or folder / manifest.output_root
-    spread = _Spread(manifest, text, folder, root.absolute())
+    spread = _Spread(manifest, text)
     jobs: list[Job] = []
-    places: dict[Path, Place] = {}
+    places: dict[str, Place] = {}
     for place, source, driver, entry in spread.pairs():
-        options, name = spread.options(place, source, driver, entry, len(jobs) + 1)
-        for output in filter(None, (options.output, options.sheet)):
-            if output in places:
+        options, outputs = spread.options(place, source, driver, entry, len(jobs) + 1)
+        for output in outputs:
+            if output.real in places:
                 raise ManifestError(
-                    f"{text.where((*place, 'output'))}: {output} is also the output of"
-                    f" {text.where(places[output])}; use a template such as"
+                    f"{text.where((*place, 'output'))}: {output.path} is also the output of"
+                    f" {text.where(places[output.real])}; use a template such as"
                     " {source}_{driver}.mp4"
                 )
-            places[output] = place
+            places[output.real] = place
+        name = getattr(entry, "name", None) or outputs[0].written
         jobs.append(Job(len(jobs), name, entry.priority, options))
     if not jobs:
         raise ManifestError(f"{text.path}: no jobs; write some under jobs or matrix")
+    _check_nesting(places, text)
     return jobs
 
 
+def _check_nesting(places: dict[str, Place], text: ManifestText) -> None:
+    """Raises: ManifestError for an output inside another one, which is a folder of frames."""
+    folders = {output.rpartition("/")[0]: place for output, place in places.items()}
+    for folder, place in folders.items():
+        parts = folder.split("/")
+        above = ("/".join(parts[:count]) for count in range(2, len(parts) + 1))
+        outer = next((path for path in above if path in places), None)
+        if outer is not None:
+            raise ManifestError(
+                f"{text.where((*place, 'output'))}: lies in {outer}, the output of"
+                f" {text.where(places[outer])}; choose another folder"
+            )
+
+
 class _Spread:
-    def __init__(self, manifest: Manifest, text: ManifestText, folder: Path, root: Path) -> None:
+    def __init__(self, manifest: Manifest, text: ManifestText) -> None:
         self._manifest = manifest
         self._text = text
-        self._folder = folder
-        self._root = root
-        self._real_root = root.resolve()
-        self._real_parents: dict[Path, Path] = {}
+        self._folder = text.path.absolute().parent
+        self._root = find_output_root(manifest, text.path)
+        self._real_root = self._root.resolve()
+        self._real_folders: dict[str, tuple[str, bool]] = {}
         self._defaults = self._written(manifest.defaults)
 
     def pairs(self) -> Iterator[tuple[Place, str, str, Any]]:
@@ -93,28 +122,30 @@ class _Spread:
 
     def options(
         self, place: Place, source: str, driver: str, entry: Any, number: int
-    ) -> tuple[RenderOptions, str]:
-        """The options of one job, and its name."""
+    ) -> tuple[RenderOptions, list[_Output]]:
+        """The options of one job, and what it writes, the output first."""
         words = {**self._defaults, **self._written(entry), "source": source, "driver": driver}
         names = {"source": _stem(source), "driver": _driver_name(driver), "index": number}
+        outputs: list[_Output] = []
         for word in BELOW_ROOT:
             if words.get(word) is not None:
-                words[word] = self._output((*place, word), words[word], names)
-        fields = {
-            OPTIONS[word].name: self._located(word, value)
-            for word, value in words.items()
-            if word in OPTIONS
-        }
+                outputs.append(self._output((*place, word), words[word], names))
+                words[word] = outputs[-1].path
         try:
-            options = options_from_words(fields)
+            options = RenderOptions(
+                **{
+                    OPTIONS[word].name: _parsed(word, self._located(word, value))
+                    for word, value in words.items()
+                    if word in OPTIONS
+                }
+            )
             reason = _unwritable(options.output.suffix, options.codec, options.crf)
         except InputError as error:
             raise ManifestError(f"{self._text.where(place)}: {error}") from None
         if reason:
             reason = reason.replace(ANY_OUTPUT, str(options.output.with_suffix("")), 1)
             raise ManifestError(f"{self._text.where(place)}: {reason}")
-        name = getattr(entry, "name", None) or str(options.output.relative_to(self._root))
-        return options, name
+        return options, outputs
 
     @staticmethod
     def _written(entry: BaseModel) -> dict[str, Any]:
@@ -154,30 +185,41 @@ class _Spread:
             found += matches
         return found
 
-    def _output(self, place: Place, template: str, names: dict[str, Any]) -> str:
+    def _output(self, place: Place, template: str, names: dict[str, Any]) -> _Output:
         try:
             written = template.format(**names)
         except (KeyError, IndexError, ValueError, AttributeError):
             raise ManifestError(
                 f"{self._text.where(place)}: {template!r} is no template; known are {PLACEHOLDERS}"
             ) from None
-        path = self._root / written
+        path = f"{self._root}/{written.rstrip('/')}"
+        folder, _, name = path.rpartition("/")
+        if folder not in self._real_folders:
+            real = Path(folder).resolve()
+            inside = real.is_relative_to(self._real_root) and ".." not in Path(written).parts
+            self._real_folders[folder] = str(real), inside and not written.startswith("/")
+        real_folder, inside = self._real_folders[folder]
         if self._manifest.outside_outputs:
-            return str(path)
-        real_parent = self._real_parents.get(path.parent)
-        if real_parent is None:
-            real_parent = self._real_parents.setdefault(path.parent, path.parent.resolve())
-        if (
-            written.startswith("/")
-            or ".." in written.split("/")
-            or not real_parent.is_relative_to(self._real_root)
-            or path.is_symlink()
-        ):
+            path = str(self._root / written)
+            return _Output(path, str(Path(path).resolve()), written)
+        if not inside or name in ("", ".", "..") or Path(path).is_symlink():
             raise ManifestError(
                 f"{self._text.where(place)}: {written!r} leaves the output root {self._root}; write"
                 " a path below it, or set outside_outputs: true"
             )
-        return str(path)
+        return _Output(path, f"{real_folder}/{name}", written)
+
+
+def _parsed(word: str, value: Any) -> Any:
+    """A value as options hold it; paths that many jobs share are one object."""
+    if OPTIONS[word].kind == "path" and word not in BELOW_ROOT:
+        return _path(value)
+    return parse_word(OPTIONS[word], value)
+
+
+@cache
+def _path(value: str) -> Path:
+    return Path(value)
 
 
 @cache

@@ -6,7 +6,7 @@ import difflib
 import json
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,12 @@ import yaml
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from motion_transfer.batch.manifest import Manifest
+from motion_transfer.batch.manifest import Defaults, Manifest
 from motion_transfer.errors import InputError
 
 SUFFIXES = (".yaml", ".yml", ".json", ".toml")
 MOST_ERRORS = 10
+SETTABLE = [f for f in Manifest.model_fields if f not in ("version", "defaults", "jobs", "matrix")]
 Place = tuple[int | str, ...]
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -36,12 +37,11 @@ def read_manifest(path: Path, settings: Sequence[str] = ()) -> tuple[Manifest, M
     data = text.data()
     if not isinstance(data, dict):
         raise ManifestError(f"{path}: a manifest is a mapping with version and jobs")
-    for setting in settings:
-        _set(data, setting)
+    given = {_set(data, setting): setting for setting in settings}
     try:
         return Manifest.model_validate(data), text
     except ValidationError as error:
-        raise text.error(error.errors()) from None
+        raise text.error(error.errors(), given) from None
 
 
 class ManifestText:
@@ -103,11 +103,22 @@ class ManifestText:
         words = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in place).lstrip(".")
         return f"{self.path}{f':{line}' if line else ''}: {words}"
 
-    def error(self, details: Sequence[ErrorDetails]) -> ManifestError:
-        """Everything that is wrong, a line each."""
-        lines = [self._sentence(detail) for detail in details[:MOST_ERRORS]]
-        if len(details) > MOST_ERRORS:
-            lines.append(f"and {len(details) - MOST_ERRORS} more")
+    def error(self, details: Sequence[ErrorDetails], given: Mapping[str, str]) -> ManifestError:
+        """Everything that is wrong, a line each.
+
+        Args:
+            given: `key=value` settings by key; what is wrong there does not stand in the file.
+        """
+        lines: dict[str, None] = {}
+        for number, detail in enumerate(details):
+            if len(lines) == MOST_ERRORS:
+                lines[f"and {len(details) - number} more"] = None
+                break
+            setting = next((given[s] for s in map(str, detail["loc"]) if s in given), None)
+            if setting is None:
+                lines[self._sentence(detail)] = None
+            else:
+                lines[f"--set {setting}: {_reason(detail)}"] = None
         return ManifestError("\n".join(lines))
 
     def _sentence(self, detail: ErrorDetails) -> str:
@@ -120,8 +131,7 @@ class ManifestText:
             return f"{self.where(place)}: unknown field; {hint}allowed are {', '.join(known)}"
         if kind == "missing":
             return f"{self.where(place)}: is missing"
-        reason = detail["msg"].removeprefix("Value error, ")
-        return f"{self.where(place)}: {value!r}: {reason}"
+        return f"{self.where(place)}: {value!r}: {_reason(detail)}"
 
     def _known_fields(self, place: Place) -> list[str]:
         model: Any = Manifest
@@ -154,8 +164,15 @@ class ManifestText:
         return start + 1 if start else None
 
 
-def _set(data: dict[str, Any], setting: str) -> None:
-    """Apply `key=value`: to the manifest if it has such a field, else to all jobs."""
+def _reason(detail: ErrorDetails) -> str:
+    return detail["msg"].removeprefix("Value error, ")
+
+
+def _set(data: dict[str, Any], setting: str) -> str:
+    """Apply `key=value`: to the manifest if it has such a field, else to all jobs; the key.
+
+    Raises: ManifestError for a key that is neither.
+    """
     key, equals, value = setting.partition("=")
     if not equals:
         raise ManifestError(f"--set {setting!r}; write key=value")
@@ -165,11 +182,16 @@ def _set(data: dict[str, Any], setting: str) -> None:
         parsed = value
     if parsed is None and value.strip() not in ("", "~", "null"):
         parsed = value  # such as #102030, which YAML takes for a comment
-    if key in Manifest.model_fields:
+    if key in SETTABLE:
         data[key] = parsed
-        return
-    data.setdefault("defaults", {})
-    entries = [data["defaults"], *data.get("jobs", []), *data.get("matrix", [])]
-    for number, entry in enumerate(entries):
-        if isinstance(entry, dict) and (number == 0 or key in entry):
+        return key
+    if key not in Defaults.model_fields:
+        known = [*SETTABLE, *Defaults.model_fields]
+        near = difflib.get_close_matches(key, known, 1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise ManifestError(f"--set {setting}: unknown field; {hint}allowed are {', '.join(known)}")
+    data["defaults"] = {**(data.get("defaults") or {}), key: parsed}
+    for entry in [*(data.get("jobs") or []), *(data.get("matrix") or [])]:
+        if isinstance(entry, dict) and key in entry:
             entry[key] = parsed
+    return key

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +15,7 @@ from motion_transfer.batch.signature import sign
 from motion_transfer.batch.state import BatchState
 from motion_transfer.batch.workers import Workers
 from motion_transfer.errors import InputError, MotionTransferError, OutputError
+from motion_transfer.media.publish import explain_disk_errors
 
 
 @dataclass
@@ -68,6 +70,11 @@ class Outcomes:
         self.tally = Tally()
         self.feature_maps = 0
 
+    @property
+    def halted(self) -> bool:
+        """Whether nothing new is begun."""
+        return self._halted
+
     def halt(self) -> None:
         """Begin nothing new; what runs is finished."""
         if not self._halted:
@@ -92,7 +99,8 @@ class Outcomes:
             self._retry(task, str(error) or type(error).__name__)
         else:
             try:
-                getattr(self, f"_{task.kind}_done")(task, result)
+                with explain_disk_errors(active.job.options.output):
+                    getattr(self, f"_{task.kind}_done")(task, result)
             except (MotionTransferError, OSError) as error:
                 self._give_up(task, str(error))
         if active.error and not active.running:
@@ -164,7 +172,7 @@ class Outcomes:
                 "duration_seconds": outline.duration_seconds,
                 "renderer": outline.renderer,
                 "note": outline.note or None,
-                "poster": str(posters) if posters else None,
+                "poster": posters,
                 "signature": sign(options, files),
             }
         )
@@ -212,7 +220,8 @@ class Outcomes:
         active.todo.clear()
         self.tally.failed += 1
         seconds = time.monotonic() - active.began
-        self._state.record({**self._facts(active, "failed", seconds), "error": message})
+        with suppress(OutputError):  # on a full disk; what is not noted is tried again all the same
+            self._state.record({**self._facts(active, "failed", seconds), "error": message})
         self._listener(events.JobFailed(active.name, message))
         if not self._keep_going:
             self.halt()

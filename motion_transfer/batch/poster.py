@@ -14,19 +14,20 @@ from motion_transfer.media.video import PictureVideo
 POSTER_PX = 160
 
 
-def write_posters(source: Path, output: Path, stem: Path) -> Path | None:
+def write_posters(source: Path, output: Path, stem: Path) -> bool:
     """Pictures of a source and of the middle of an output, beside each other in one folder.
 
     Args:
         stem: `-source.png` and `-result.png` are added to it.
-    Returns: the stem, or None where a picture could not be had, which no job fails for.
+    Returns: False where a picture could not be had, which no job fails for.
     """
     try:
+        stem.parent.mkdir(parents=True, exist_ok=True)
         write_png(stem.with_name(f"{stem.name}-source.png"), _small(read_photo(source).rgb))
         write_png(stem.with_name(f"{stem.name}-result.png"), _small(_middle(output)))
     except (InputError, OSError):
-        return None
-    return stem
+        return False
+    return True
 
 
 def _middle(output: Path) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -16,23 +15,16 @@ from motion_transfer.media.publish import explain_disk_errors
 from motion_transfer.version import __version__
 
 REPORT_FORMAT = "batch-report-1"
+PICTURES = ("source", "result")
 PUBLIC = ("seconds", "frames", "duration_seconds", "renderer", "note", "error")
 
 
-def write_report(folder: Path, jobs: Sequence[Job], state: BatchState) -> Path:
-    """Write `index.html`, `report.json` and their pictures. Raises: OutputError."""
+def write_report(jobs: Sequence[Job], state: BatchState) -> Path:
+    """Write `index.html` and `report.json`; the pictures are there. Raises: OutputError."""
+    folder = state.report
     with explain_disk_errors(folder):
-        pictures = folder / "pictures"
-        pictures.mkdir(parents=True, exist_ok=True)
-        entries = [_entry(job, state, folder) for job in jobs]
-        for entry in entries:
-            for kind in ("source", "result"):
-                name = f"{entry['index']:06d}-{kind}.png"
-                if (state.pictures / name).exists() and entry["status"] == "done":
-                    shutil.copyfile(state.pictures / name, pictures / name)
-                entry[f"{kind}_picture"] = (
-                    f"pictures/{name}" if (pictures / name).exists() else None
-                )
+        folder.mkdir(parents=True, exist_ok=True)
+        entries = [_entry(job, state) for job in jobs]
         counts = {word: sum(e["status"] == word for e in entries) for word in _statuses(entries)}
         facts = {"format": REPORT_FORMAT, "version": __version__, "counts": counts}
         _write(folder / "report.json", json.dumps({**facts, "jobs": entries}, indent=1))
@@ -40,16 +32,21 @@ def write_report(folder: Path, jobs: Sequence[Job], state: BatchState) -> Path:
     return folder / "index.html"
 
 
-def _entry(job: Job, state: BatchState, folder: Path) -> dict[str, Any]:
-    record = state.records.get(str(job.options.output), {})
+def _entry(job: Job, state: BatchState) -> dict[str, Any]:
+    output = job.options.output
+    record = state.records.get(str(output), {})
+    status = state.status_of(output)
+    has_pictures = status == "done" and record.get("poster")
+    stem = f"pictures/{state.picture_stem(output).name}"
     return {
         "index": job.index,
         "name": job.name,
-        "status": record.get("status", "to do"),
-        "output": os.path.relpath(job.options.output, folder),
+        "status": status,
+        "output": os.path.relpath(output, state.report),
         "source": str(job.options.source),
         "driver": str(job.options.driver),
-        **{key: record[key] for key in PUBLIC if record.get(key) is not None},
+        **{f"{k}_picture": f"{stem}-{k}.png" if has_pictures else None for k in PICTURES},
+        **({key: record[key] for key in PUBLIC if record.get(key) is not None} if record else {}),
     }
 
 

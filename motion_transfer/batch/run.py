@@ -10,17 +10,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from motion_transfer.batch.events import BatchFinished, BatchListener, BatchStarted
-from motion_transfer.batch.expand import Job, check_inputs, expand
+from motion_transfer.batch.expand import Job, check_inputs, expand, find_output_root
 from motion_transfer.batch.manifest import Manifest
 from motion_transfer.batch.manifest_file import ManifestError, read_manifest
 from motion_transfer.batch.report import write_report
 from motion_transfer.batch.schedule import Scheduler, Tally
-from motion_transfer.batch.state import BatchState
+from motion_transfer.batch.state import TO_DO, BatchState
 from motion_transfer.batch.workers import LocalWorkers, Workers
 from motion_transfer.errors import InputError
+from motion_transfer.media.publish import explain_disk_errors
 
 ENGINES = ("local", "ray")
 MOST_PROBLEMS = 10
@@ -58,6 +59,17 @@ class BatchOptions:
             raise InputError("--address is of a Ray cluster; add --engine ray")
 
 
+class Haltable(Protocol):
+    """What Ctrl-C is for: a scheduler."""
+
+    @property
+    def halted(self) -> bool: ...
+
+    def halt(self) -> None:
+        """Begin nothing new."""
+        ...
+
+
 @dataclass(frozen=True)
 class Batch:
     """A manifest that was read."""
@@ -65,19 +77,14 @@ class Batch:
     manifest: Manifest
     jobs: list[Job]
     state: BatchState
-    output_root: Path
     path: Path
-
-    @property
-    def report_folder(self) -> Path:
-        return self.output_root / f"{self.path.stem}.report"
 
 
 def read_batch(path: Path, settings: Sequence[str] = ()) -> Batch:
     """Read a manifest and lay out its jobs. Raises: ManifestError."""
     manifest, text = read_manifest(path, settings)
-    root = path.absolute().parent / manifest.output_root
-    return Batch(manifest, expand(manifest, text), BatchState(path, root), root, path)
+    root = find_output_root(manifest, path)
+    return Batch(manifest, expand(manifest, text), BatchState(path, root), path)
 
 
 def validate(batch: Batch) -> None:
@@ -97,8 +104,8 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
     """
     began = time.monotonic()
     batch = read_batch(options.manifest, options.settings)
-    jobs = _choose(batch.jobs, options)
-    with batch.state.held():
+    jobs = choose_jobs(batch.jobs, options)
+    with explain_disk_errors(batch.state.folder), batch.state.held():
         if options.restart:
             batch.state.forget()
         workers = _open_workers(options, batch.state.scratch)
@@ -112,21 +119,16 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
             listener=listener,
         )
         listener(BatchStarted(len(jobs), workers.count))
-        with _interrupts(scheduler) as interrupts:
-            try:
-                tally = scheduler.run()
-            except BaseException:
-                workers.stop(now=True)
-                raise
-            workers.stop(now=False)
-        write_report(batch.report_folder, batch.jobs, batch.state)
-    listener(
-        BatchFinished(
-            *(tally.done, tally.current, tally.failed, tally.left),
-            time.monotonic() - began,
-            scheduler.feature_maps,
+        with heed_interrupts(scheduler) as interrupts:
+            tally = scheduler.run()
+        listener(
+            BatchFinished(
+                *(tally.done, tally.current, tally.failed, tally.left),
+                time.monotonic() - began,
+                scheduler.feature_maps,
+            )
         )
-    )
+        write_report(batch.jobs, batch.state)
     if interrupts:
         raise KeyboardInterrupt
     return tally
@@ -134,14 +136,14 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
 
 def status(batch: Batch) -> dict[str, int]:
     """How many jobs are done, failed and not begun, as far as was noted."""
-    counts = {"done": 0, "failed": 0, "to do": 0}
+    counts = {"done": 0, "failed": 0, TO_DO: 0}
     for job in batch.jobs:
-        record = batch.state.records.get(str(job.options.output), {})
-        counts[record.get("status", "to do")] += 1
+        counts[batch.state.status_of(job.options.output)] += 1
     return counts
 
 
-def _choose(jobs: list[Job], options: BatchOptions) -> list[Job]:
+def choose_jobs(jobs: list[Job], options: BatchOptions) -> list[Job]:
+    """The jobs that the options name. Raises: InputError if there are none."""
     start, stop = options.chosen
     chosen = jobs[slice(start, stop)]
     if not chosen:
@@ -167,13 +169,16 @@ def _default_count() -> int:
 
 
 @contextmanager
-def _interrupts(scheduler: Scheduler) -> Iterator[list[Any]]:
-    """The first Ctrl-C lets running chunks finish, the second stops now."""
-    heard: list[Any] = []
+def heed_interrupts(scheduler: Haltable) -> Iterator[list[int]]:
+    """The first Ctrl-C lets running chunks finish; one while they do stops now.
+
+    Yields: the signals that were heard.
+    """
+    heard: list[int] = []
 
     def hear(number: int, _frame: Any) -> None:
         heard.append(number)
-        if len(heard) > 1:
+        if scheduler.halted:
             raise KeyboardInterrupt
         scheduler.halt()
 

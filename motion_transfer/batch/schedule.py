@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
+from pathlib import Path
 
 from motion_transfer.batch import events, tasks
 from motion_transfer.batch.active import ActiveJob, Shared, look_name, scan_name
@@ -42,10 +43,15 @@ class Scheduler(Outcomes):
     ) -> None:
         super().__init__(workers, state, retries=retries, keep_going=keep_going, listener=listener)
         self._restart = restart
+        self._statuses: dict[Path, str] = {}
         self._waiting = self._order(jobs)
 
     def run(self) -> Tally:
-        """Work until nothing is left to do. However it ends, every finished chunk is kept."""
+        """Work until nothing is left to do, then end the workers.
+
+        However it ends, every finished chunk is kept.
+        """
+        interrupted = True
         try:
             while True:
                 if not self._halted:
@@ -55,7 +61,9 @@ class Scheduler(Outcomes):
                 done, _ = wait(self._running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED)
                 for future in done:
                     self._receive(future)
+            interrupted = False
         finally:
+            self._workers.stop(now=interrupted)  # before the folders they write in are tidied
             self.tally.left = len(self._waiting)
             for active in list(self._active):
                 self.tally.left += not active.error
@@ -126,14 +134,15 @@ class Scheduler(Outcomes):
             if active.scan.state == active.look.state == "ready":
                 active.stage = "preparing"
                 blobs = (active.scan.blobs["scan"], active.look.blobs["source"])
-                return Task("prepare", tasks.prepare, (options, *blobs), active)
+                arguments = (options, *blobs, active.look.files)
+                return Task("prepare", tasks.prepare, arguments, active)
             return None
         if active.stage == "rendering" and active.todo:
             return self._chunk_task(active, place)
         if active.stage == "rendering" and not active.left and not active.running:
             active.stage = "assembling"
-            pictures = self._state.pictures / f"{active.job.index:06d}"
-            arguments = (options, active.prepared, active.work.path, pictures)
+            stem = self._state.picture_stem(options.output)
+            arguments = (options, active.prepared, active.work.path, stem)
             return Task("assemble", tasks.assemble, arguments, active)
         return None
 
@@ -162,7 +171,7 @@ class Scheduler(Outcomes):
         record = self._state.records.get(str(options.output), {})
         signature = record.get("signature", {})
         names = scan_name(options), look_name(options)
-        if not self._restart and is_current(options, signature):
+        if not self._restart and is_current(options, signature, self._statuses):
             self.tally.current += 1
             self._release(names)
             return

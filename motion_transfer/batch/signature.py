@@ -55,13 +55,35 @@ def sign_files(paths: Iterable[Path]) -> Files:
         raise InputError(f"{error.filename} does not exist") from None
 
 
+def check_unchanged(files: Files) -> None:
+    """Raises: InputError if a file is not what it was when it was signed."""
+    for name, (status, digest) in files.items():
+        path = Path(name)
+        try:
+            unchanged = status == _status(path) or digest == digest_of(path)
+        except FileNotFoundError:
+            raise InputError(f"{path} does not exist") from None
+        if not unchanged:
+            raise InputError(f"{path} has changed since the batch began; start it again")
+
+
 def sign(options: RenderOptions, files: Files) -> Signature:
     """What is remembered of a published output, to know it again. Raises: OSError."""
     return {"options": _options_key(options), "files": files, "output": _status(options.output)}
 
 
-def is_current(options: RenderOptions, signature: Signature) -> bool:
-    """Whether the output is there, untouched, and made from these options and this content."""
+def is_current(options: RenderOptions, signature: Signature, statuses: dict[Path, str]) -> bool:
+    """Whether the output is there, untouched, and made from these options and this content.
+
+    Args:
+        statuses: of inputs, looked up here and noted; for jobs that share them.
+    """
+
+    def status(path: Path) -> str:
+        if path not in statuses:
+            statuses[path] = _status(path)
+        return statuses[path]
+
     try:
         if signature["options"] != _options_key(options):
             return False
@@ -70,7 +92,7 @@ def is_current(options: RenderOptions, signature: Signature) -> bool:
         parts = (driver_files(options), source_files(options), audio_files(options))
         paths = {str(path): path for part in parts for path in part}
         return paths.keys() == signature["files"].keys() and all(
-            signature["files"][name][0] == _status(path)
+            signature["files"][name][0] == status(path)
             or signature["files"][name][1] == digest_of(path)
             for name, path in paths.items()
         )

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from motion_transfer.batch.signature import (
     Files,
     audio_files,
+    check_unchanged,
     driver_files,
     sign_files,
     source_files,
@@ -113,8 +114,14 @@ def look(options: RenderOptions) -> tuple[bytes, bytes, Files]:
     return pickle.dumps(source, 5), pickle.dumps(recipe.appearance_of(source), 5), files
 
 
-def prepare(options: RenderOptions, scanned: Fetch, source: Fetch) -> tuple[bytes, Outline]:
-    """A run, planned. Raises: InputError and its kinds."""
+def prepare(
+    options: RenderOptions, scanned: Fetch, source: Fetch, source_files: Files
+) -> tuple[bytes, Outline]:
+    """A run, planned.
+
+    Raises: InputError and its kinds, also if a source is no longer what its appearance was made
+        from: chunks are keyed by what its files hold now.
+    """
     from motion_transfer.media.formats import choose_format
     from motion_transfer.render.events import ignore
     from motion_transfer.render.missing import describe_missing
@@ -132,6 +139,7 @@ def prepare(options: RenderOptions, scanned: Fetch, source: Fetch) -> tuple[byte
     check_length(options, output_format, plan)
     recipe = choose_run_recipe(options, plan, ignore)
     run = prepare_run(options, output_format, driver, plan, recipe, pickle.loads(source()))
+    check_unchanged(source_files)
     chunks = tuple(
         ChunkOutline(c.index, c.start, c.stop, piece_of(run, c), run.chunk_keys[c.index])
         for c in plan.chunks
@@ -198,9 +206,12 @@ def render(
 
 
 def assemble(
-    options: RenderOptions, prepared: Fetch, folder: Path, pictures: Path | None
-) -> tuple[Path, Path | None, Files]:
-    """Join finished segments: the output without its name yet, its poster, its sound's file."""
+    options: RenderOptions, prepared: Fetch, folder: Path, pictures: Path
+) -> tuple[Path, bool, Files]:
+    """Join finished segments.
+
+    Returns: the output without its name yet, whether it has posters, its sound's file.
+    """
     from motion_transfer.batch.poster import write_posters
     from motion_transfer.media.publish import explain_disk_errors
     from motion_transfer.render.run import assemble as join
@@ -211,7 +222,7 @@ def assemble(
     sheet = ContactSheet(folder, len(run.plan.frames)) if options.sheet else None
     with explain_disk_errors(options.output):
         finished = join(options, run, folder, sheet)
-    posters = write_posters(options.source, finished, pictures) if pictures else None
+    posters = write_posters(options.source, finished, pictures)
     return finished, posters, files
 
 

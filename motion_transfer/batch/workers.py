@@ -8,10 +8,12 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from functools import partial
+from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, Protocol
@@ -61,6 +63,7 @@ class LocalWorkers:
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True, mode=0o700)
         self._pools: list[ProcessPoolExecutor | None] = [None] * count
+        resource_tracker.ensure_running()  # which would lift `_deaf` if it began inside it
 
     def submit(self, place: int, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
         pool = self._pools[place]
@@ -75,7 +78,8 @@ class LocalWorkers:
             initializer=begin_worker,
             initargs=(place, self.count, sys.path),
         )
-        return pool.submit(task, *arguments)
+        with _deaf():
+            return pool.submit(task, *arguments)
 
     def share(self, name: str, blob: bytes) -> Fetch:
         path = self._scratch / name
@@ -97,7 +101,6 @@ class LocalWorkers:
 def begin_worker(place: int, count: int, path: list[str]) -> None:
     """Settle into a worker process: its share of the cores, its GPU, nobody's orphan."""
     sys.path[:] = path
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the scheduler's to hear
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_follow_parent, daemon=True).start()
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -109,6 +112,16 @@ def begin_worker(place: int, count: int, path: list[str]) -> None:
     threads = max(1, len(os.sched_getaffinity(0)) // count)
     torch.set_num_threads(threads)
     cv2.setNumThreads(threads)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that begin inside never hear Ctrl-C: it is the scheduler's, who hears it after."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _follow_parent() -> None:

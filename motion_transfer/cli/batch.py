@@ -108,7 +108,7 @@ def report(manifest: Path, settings: tuple[str, ...]) -> None:
     from motion_transfer.batch.run import read_batch
 
     read = read_batch(manifest, settings)
-    click.echo(f"wrote {write_report(read.report_folder, read.jobs, read.state)}")
+    click.echo(f"wrote {write_report(read.jobs, read.state)}")
 
 
 @batch.command()
@@ -174,7 +174,7 @@ def _words(event: BatchEvent) -> tuple[str, bool]:
             return f"wrote {event.output}: {event.frame_count} frames ({rate:.0f} frames/s)", True
         case events.BatchStopping():
             return (
-                f"mt: finishing {event.running_count} running chunks; Ctrl-C again stops now",
+                f"mt: finishing {event.running_count} running chunks; Ctrl-C now stops at once",
                 False,
             )
         case events.BatchFinished():

@@ -50,8 +50,14 @@ class Journal:
         return entries, whole_bytes
 
     def append(self, entry: Entry) -> None:
-        """Write a line; on return it is on disk. Raises: OSError."""
-        with self._path.open("ab") as file:
-            file.write(json.dumps(entry, separators=(",", ":")).encode() + b"\n")
-            file.flush()
-            os.fsync(file.fileno())
+        """Write a line; on return it is on disk. Raises: OSError, with nothing written."""
+        line = json.dumps(entry, separators=(",", ":")).encode() + b"\n"
+        with self._path.open("ab", buffering=0) as file:
+            whole_bytes = file.seek(0, os.SEEK_END)
+            try:
+                while line:
+                    line = line[file.write(line) :]
+                os.fsync(file.fileno())
+            except OSError:  # a full disk: no later line is believed behind half a line
+                os.truncate(self._path, whole_bytes)
+                raise

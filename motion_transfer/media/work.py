@@ -90,8 +90,7 @@ class WorkFolder:
             if self._restart:
                 self._remove_content()
             self._pieces = {entry["piece"]: entry for entry in self._journal.repair()}
-            for stray in self.path.glob("*.part-*"):
-                _remove(stray)
+            self._remove_strays()
         return self
 
     def __exit__(
@@ -100,7 +99,9 @@ class WorkFolder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if not self._pieces:
+        if self._pieces:
+            self._remove_strays()
+        else:
             self.clear()
         self._lock.__exit__(None, None, None)
 
@@ -154,6 +155,11 @@ class WorkFolder:
         if entry is None or not self._final.exists() or key not in (None, entry["key"]):
             return False
         return _identity(self._final) == entry["sha256"]
+
+    def _remove_strays(self) -> None:
+        """What was being written when its writer was stopped."""
+        for stray in self.path.glob("*.part-*"):
+            _remove(stray)
 
     def _remove_content(self) -> None:
         for item in self.path.iterdir():

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 import yaml
+from processes import wait_until_gone
 
 from motion_transfer.render.plan import CHUNK_FRAMES
 
 FRAMES = 2 * CHUNK_FRAMES + 7
+EVERYTHING = 1_000_000
+KILLS = int(os.environ.get("MT_KILLS", "1"))  # a long run sets more
 
 
 @pytest.fixture
@@ -26,6 +31,7 @@ def shoot(studio) -> Path:
     studio.array(9, name="wave.npy")
     return manifest(
         studio,
+        defaults={"renderer": "texture"},
         matrix=[
             {
                 "sources": ["anna.png", "ben.png"],
@@ -66,6 +72,51 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted(folder.glob("*.mp4"))}
 
 
+def start(path: Path, *more: object) -> subprocess.Popen[str]:
+    """A batch as a shell starts it: its Ctrl-C goes to all its processes."""
+    return subprocess.Popen(
+        command("run", path, "--json", *more),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def follow(process: subprocess.Popen[str], kind: str) -> None:
+    """Read events until one of a kind."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        if json.loads(line)["event"] == kind:
+            return
+    raise AssertionError(f"ended without {kind}: {process.communicate()[1]}")
+
+
+def killed_after(process: subprocess.Popen[str], count: int, finished: Counter[str]) -> None:
+    """Kill a batch after so many events."""
+    assert process.stdout is not None
+    told = []
+    for line in process.stdout:
+        told.append(json.loads(line))
+        if len(told) == count:
+            process.kill()
+            break
+    note_finished(told, finished)
+
+
+def note_finished(told: list[dict], finished: Counter[str]) -> None:
+    """Count each job's finished frames; of what was finished before, nothing is done twice."""
+    for event in told:
+        if event["event"] == "jobplanned":
+            assert event["done_count"] >= finished[event["name"]]
+            finished[event["name"]] = event["done_count"]
+        if event["event"] == "jobframes":
+            finished[event["name"]] += event["frame_count"]
+        if event["event"] == "jobdone":
+            finished[event["name"]] = EVERYTHING
+
+
 def kill_after(path: Path, frames_events: int, number: int, *more: object) -> int:
     """Start a batch, send it a signal after so many chunks; its exit code."""
     with subprocess.Popen(
@@ -94,13 +145,17 @@ def test_workers_and_kills_change_nothing_and_sources_are_shared(studio, shoot: 
     assert (finished["done_count"], finished["feature_maps"]) == (4, 2)
 
     other = "output_root=other"
-    assert kill_after(shoot, 1, signal.SIGKILL, "--set", other) == -signal.SIGKILL
-    assert all(whole[name] == data for name, data in contents(studio.folder / "other").items())
+    finished: Counter[str] = Counter()
+    moments = random.Random(0)
+    for number in range(KILLS):
+        with start(shoot, "--set", other, "--workers", 1 + number % 3) as process:
+            killed_after(process, moments.randrange(2, 16), finished)
+        wait_until_gone(process.pid)
+        assert contents(studio.folder / "other").items() <= whole.items()
     code, told, _ = run(shoot, "--workers", 1, "--set", other)
     assert code == 0
+    note_finished(told, finished)
     assert contents(studio.folder / "other") == whole
-    planned = named(told, "jobplanned")
-    assert any(event["done_count"] >= CHUNK_FRAMES for event in planned)
     left = {item.name for item in (studio.folder / "other").iterdir()} - set(whole)
     assert left == {".shoot.batch", "shoot.report"}
 
@@ -131,7 +186,7 @@ def test_jobs_fail_alone_and_go_on_when_mended(studio, shoot: Path) -> None:
         {"source": "anna.png", "driver": "wave.npy", "output": "taken.mp4"},
         {"source": "anna.png", "driver": "wave.npy", "output": "good.mp4"},
     ]
-    path = manifest(studio, jobs=jobs)
+    path = manifest(studio, defaults={"renderer": "texture"}, jobs=jobs)
     (studio.folder / "out").mkdir()
     (studio.folder / "out/taken.mp4").write_text("mine")
     code, told, _ = run(path, "--workers", 1)
@@ -147,7 +202,7 @@ def test_jobs_fail_alone_and_go_on_when_mended(studio, shoot: Path) -> None:
     facts = json.loads((studio.folder / "out/shoot.report/report.json").read_text())
     assert facts["counts"] == {"done": 1, "failed": 3}
     assert "gone.png does not exist" in page
-    assert (studio.folder / "out/shoot.report/pictures/000003-result.png").exists()
+    assert (studio.folder / "out/shoot.report/pictures").glob("*-result.png")
 
     (damaged / "frame_1_IUV.png").write_bytes(good)
     studio.source("gone")
@@ -164,7 +219,7 @@ def test_held_frames_are_as_in_a_single_run_and_reported(studio) -> None:
         {"source": source.name, "driver": driver.name, "missing": "hold", "output": f"{name}.mp4"}
         for name in "ab"
     ]
-    path = manifest(studio, jobs=jobs)
+    path = manifest(studio, defaults={"renderer": "texture"}, jobs=jobs)
     code, told, _ = run(path, "--workers", 1)
     assert code == 0
     note = f"nobody found in 5 of {CHUNK_FRAMES + 4} frames, the frame before: 0:00.00-0:00.03"
@@ -215,3 +270,40 @@ def test_ctrl_c_finishes_running_chunks(studio, shoot: Path) -> None:
     code, told, _ = run(shoot, "--workers", 2)
     assert code == 0
     assert any(event["done_count"] for event in named(told, "jobplanned"))
+
+
+def test_a_second_ctrl_c_stops_at_once(studio, shoot: Path) -> None:
+    with start(shoot, "--workers", 2) as process:
+        follow(process, "jobframes")
+        os.killpg(process.pid, signal.SIGINT)
+        follow(process, "batchstopping")
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=300)
+    assert process.returncode == 130
+    assert errors.splitlines()[-1] == "mt: interrupted, nothing half-written was left behind"
+    assert "Traceback" not in errors
+    wait_until_gone(process.pid)
+    root = studio.folder / "out"
+    assert not list(root.rglob("*.part-*"))
+    assert not (root / ".shoot.batch/scratch").exists()
+    early = contents(root)
+    code, told, _ = run(shoot, "--workers", 2)
+    assert (code, named(told, "jobfailed")) == (0, [])
+    assert early.items() <= contents(root).items()
+    assert len(contents(root)) == 4
+
+
+def test_the_network_draws_the_same_with_any_number_of_workers(studio, shoot, checkpoint) -> None:
+    network = [
+        *("--set", "renderer=nhrr", "--set", f"weights={checkpoint}", "--set", "compile=false"),
+        *("--jobs", ":2"),
+    ]
+    drawn = []
+    for count in (1, 2, 4):
+        root = f"output_root=with{count}"
+        code, told, errors = run(shoot, "--workers", count, "--set", root, *network)
+        assert (code, errors) == (0, "")
+        assert named(told, "batchfinished")[0]["feature_maps"] == 1
+        drawn.append(contents(studio.folder / f"with{count}"))
+    assert list(drawn[0]) == ["anna_walk.mp4", "anna_wave.mp4"]
+    assert drawn[0] == drawn[1] == drawn[2]

@@ -13,9 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import wait_until_gone
 
 from motion_transfer import render_video
 from motion_transfer.errors import InputError
+from motion_transfer.media.journal import Journal
 from motion_transfer.media.work import work_path
 from motion_transfer.render.events import FramesDone, Notice, Stage, Started
 from motion_transfer.render.plan import CHUNK_FRAMES
@@ -40,14 +42,18 @@ def inputs(studio) -> None:
 
 
 def killed(words: list[str], after_events: int) -> int | None:
-    """Start a run, kill it after so many events; its exit code, None if it was done before."""
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+    """Start a run and kill it after so many events; its exit code if it ended before that."""
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
         assert process.stdout is not None
         for count, _ in enumerate(process.stdout):
             if count == after_events:
                 process.kill()
-                return None
-        return process.wait()
+                break
+        code = process.wait()
+    wait_until_gone(process.pid)
+    return None if code == -signal.SIGKILL else code
 
 
 def content(path: Path) -> dict[str, bytes]:
@@ -68,6 +74,9 @@ def test_kills_change_nothing(studio, inputs, name: str) -> None:
             break
         assert {item.name for item in output.parent.glob("*")} <= {name, work_path(output).name}
         assert not output.exists() or content(output) == content(whole)
+        entries = Journal(work_path(output) / "journal.jsonl").read()
+        pieces = [entry["piece"] for entry in entries]
+        assert len(set(pieces)) == len(pieces)  # what was finished is not done again
     if not output.exists() or work_path(output).exists():
         subprocess.run(command(studio, output), check=True, capture_output=True)
     assert content(output) == content(whole)

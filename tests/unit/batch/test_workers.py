@@ -1,0 +1,63 @@
+"""Worker processes: they do not hear Ctrl-C, are replaced when they die, and end when told."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+import pytest
+
+from motion_transfer.batch.run import heed_interrupts
+from motion_transfer.batch.workers import LocalWorkers
+
+
+def test_workers_hear_no_ctrl_c_and_are_replaced(tmp_path: Path) -> None:
+    workers = LocalWorkers(1, tmp_path / "scratch")
+    try:
+        answer = workers.submit(0, os.getpid)
+        (child,) = multiprocessing.active_children()
+        assert child.pid is not None
+        os.kill(child.pid, signal.SIGINT)  # it has only just begun
+        assert answer.result(300) == child.pid
+        with pytest.raises(BrokenProcessPool):
+            workers.submit(0, os._exit, 9).result(300)
+        blob = workers.share("blob", b"content")
+        assert workers.submit(0, blob).result(300) == b"content"
+        workers.submit(0, time.sleep, 600)
+    finally:
+        began = time.monotonic()
+        workers.stop(now=True)
+    assert time.monotonic() - began < 300
+    assert multiprocessing.active_children() == []
+    assert not (tmp_path / "scratch").exists()
+
+
+class Halting:
+    """A scheduler that notes that it was told to stop."""
+
+    halted = False
+
+    def halt(self) -> None:
+        self.halted = True
+
+
+def test_the_first_ctrl_c_halts_and_the_second_stops() -> None:
+    scheduler = Halting()
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), heed_interrupts(scheduler) as heard:
+        signal.raise_signal(signal.SIGINT)
+        assert scheduler.halted
+        assert heard
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_ctrl_c_after_a_job_failed_fast_stops() -> None:
+    scheduler = Halting()
+    scheduler.halt()
+    with pytest.raises(KeyboardInterrupt), heed_interrupts(scheduler):
+        signal.raise_signal(signal.SIGINT)
