@@ -169,6 +169,7 @@ def _spread(
         unknown, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
     known = np.flatnonzero(unknown.ravel() == 0)
+    nearest = nearest.astype(np.intp)
     colours = np.zeros((nearest.max() + 1, 3), np.uint8)
     colours[nearest.ravel()[known]] = rgb.reshape(-1, 3)[known]
     return colours[nearest]
