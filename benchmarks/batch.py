@@ -61,6 +61,7 @@ def run_manifest(path: Path) -> list[int]:
 def overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> None:
     import numpy as np
 
+    from motion_transfer.media.work import WorkFolder
     from motion_transfer.render.engine import TURN_TAKERS, Engine
     from motion_transfer.render.events import ignore
     from motion_transfer.render.options import RenderOptions
@@ -73,9 +74,10 @@ def overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> None:
         weights=random_checkpoint(folder, preset),
         compile=True,
     )
-    prepared, appearance = prepare(options, ignore)
+    with WorkFolder(options.output) as work:
+        prepared, appearance = prepare(options, work, ignore)
     renderer, reader = prepared.recipe.renderer(appearance), prepared.driver.open()
-    crops = np.stack([prepared.plan.window.cut(iuv, 256) for iuv in reader.read(0, 4)])
+    crops = np.stack([prepared.plan.shots[0].window.cut(iuv, 256) for iuv in reader.read(0, 4)])
     ratios = []
     for index in range(rounds):
         began = time.perf_counter()

@@ -18,7 +18,10 @@ Stage = Literal["begun", "preparing", "rendering", "assembling", "ended"]
 
 def scan_name(options: RenderOptions) -> str:
     """Jobs of one name share a look at their driver."""
-    words = (options.driver, options.missing, options.iuv_order, options.frames)
+    words = (
+        *(options.driver, options.missing, options.iuv_order, options.frames),
+        *(options.driver_kind, options.driver_person, options.estimator, options.estimator_model),
+    )
     return "scan-" + key_of({"scan": words})[:32]
 
 
@@ -27,6 +30,7 @@ def look_name(options: RenderOptions) -> str:
     words = (
         *(options.source, options.source_iuv, options.source_iuv_order, options.person),
         *(options.garments, options.renderer_name, options.weights),
+        *(options.estimator, options.estimator_model),
     )
     return "look-" + key_of({"look": words})[:32]
 

@@ -23,6 +23,7 @@ class BatchState:
         self.folder = output_root / f".{manifest.stem}.batch"
         self.pictures = self.folder / "pictures"
         self.scratch = self.folder / "scratch"
+        self.estimates = (self.folder / "estimates").absolute()
         self._manifest = manifest
         self._journal = Journal(self.folder / "journal.jsonl")
         self.records = {record["output"]: record for record in self._journal.read()}

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Literal
 
 import numpy as np
@@ -66,6 +67,7 @@ def estimate_clip(
     *,
     person: str = EVERYBODY,
     missing: MissingPeople = "background",
+    chosen: range | None = None,
     summary: ClipSummary | None = None,
 ) -> Generator[Frame, None, None]:
     """The IUV of every frame, H x W x 3 uint8, (I, U, V).
@@ -74,12 +76,14 @@ def estimate_clip(
         person: `all`, `largest`, an index from the left, or a box; see `Follower`.
         missing: what a frame without anybody shows: the frame before (`hold`; at the start, the
             first one with somebody), `background`, or it is an error (`fail`).
-        summary: filled as frames are read.
+        chosen: the frames that are wanted: those before are shown empty, those behind are not read.
+        summary: filled as frames are read; of the chosen ones.
     Raises: InputError if nobody is found in any frame, or in one where `fail` forbids it, or for a
         frame that is broken.
     """
     summary = summary if summary is not None else ClipSummary()
-    frames = _estimate(pictures, estimator, person, summary, fail=missing == "fail")
+    chosen = chosen or range(pictures.frame_count)
+    frames = _estimate(pictures, estimator, person, summary, chosen, fail=missing == "fail")
     with closing(read_ahead(frames, AHEAD_FRAMES)) as ahead:
         yield from fill_gaps(ahead, "hold") if missing == "hold" else ahead
     if summary.empty_count == summary.frame_count:
@@ -91,12 +95,22 @@ def estimate_clip(
 
 
 def _estimate(
-    pictures: PictureStream, estimator: Estimator, person: str, summary: ClipSummary, *, fail: bool
+    pictures: PictureStream,
+    estimator: Estimator,
+    person: str,
+    summary: ClipSummary,
+    chosen: range,
+    *,
+    fail: bool,
 ) -> Iterator[Frame]:
     follower = Follower(person)
-    with closing(read_ahead(mark_shots(pictures.read()), AHEAD_FRAMES)) as frames:
+    marked = mark_shots(islice(pictures.read(), chosen.stop))
+    with closing(read_ahead(marked, AHEAD_FRAMES)) as frames:
         for index, (picture, begins) in enumerate(frames):
-            if begins:
+            if index < chosen.start:
+                yield np.zeros_like(picture)
+                continue
+            if begins or index == chosen.start:
                 summary.shots.append(index)
                 estimator.start_shot()
                 follower.start_shot()
