@@ -77,14 +77,17 @@ def kind_of(frame: Frame) -> DriverKind | None:
             return "iuv"
     if explain_picture(frame) is not None:
         return "iuv"
-    bright = np.quantile(frame.reshape(-1, 3), MOSTLY, axis=0) > PART_COUNT + CODEC_NOISE
-    return "pictures" if bright[0] and bright[2] else None
+    pixels = frame.reshape(-1, 3)
+    bright = np.quantile(pixels, MOSTLY, axis=0) > PART_COUNT + CODEC_NOISE
+    crowded = _black_share(pixels) < EMPTY_SHARE and min(pixels.max(0)[[0, 2]]) > PART_COUNT
+    return "pictures" if (bright[0] and bright[2]) or (bright.any() and crowded) else None
 
 
 def _is_iuv(image: Frame) -> bool:
     """Whether (I, U, V) are what they should be, exactly."""
     part = image[..., 0]
-    return int(part.max()) <= PART_COUNT and not image[part == 0].any()
+    background = image[part == 0]
+    return int(part.max()) <= PART_COUNT and len(background) > 0 and not background.any()
 
 
 def _is_scaled(image: Frame) -> bool:
@@ -96,10 +99,12 @@ def _was_iuv(image: Frame) -> bool:
     of the frame black in all."""
     pixels = image.reshape(-1, 3)
     high = np.quantile(pixels, MOSTLY, axis=0)
-    black = (pixels <= CODEC_NOISE).all(1).mean()
-    return bool(
-        high[0] <= PART_COUNT + CODEC_NOISE and high[1:].min() > 100 and black > EMPTY_SHARE
-    )
+    dark = high[0] <= PART_COUNT + CODEC_NOISE
+    return bool(dark and high[1:].min() > 100 and _black_share(pixels) > EMPTY_SHARE)
+
+
+def _black_share(pixels: UInt8[np.ndarray, "N 3"]) -> float:
+    return float((pixels <= CODEC_NOISE).all(1).mean())
 
 
 def _frames(path: Path) -> Iterator[Frame] | None:

@@ -38,7 +38,7 @@ def red(red_model: Path) -> dict:
 
 
 def ground(name: str) -> np.ndarray:
-    return np.ascontiguousarray(getattr(data, name)()[: SIZE[0], : SIZE[1]]) // 2
+    return np.ascontiguousarray(getattr(data, name)()[: SIZE[0], : SIZE[1]]) // 2 + 60
 
 
 def somebody(box: Box, behind: np.ndarray | None = None) -> np.ndarray:

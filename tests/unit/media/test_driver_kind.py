@@ -31,6 +31,13 @@ def test_iuv_is_iuv(studio, order: str) -> None:
     assert kind_of(scaled) == "iuv"  # to be refused by those who read IUV
 
 
+def test_a_dark_corner_is_no_iuv() -> None:
+    """Little blue in it, and nothing black: no IUV, but no clear picture either."""
+    corner = data.coffee()[:96, :128] // 2
+    assert kind_of(corner) is None
+    assert kind_of(corner + 60) == "pictures"
+
+
 def test_what_is_too_dark_says_nothing() -> None:
     assert kind_of(np.zeros((9, 9, 3), np.uint8)) is None
     assert kind_of(np.full((9, 9, 3), 12, np.uint8)) is None
