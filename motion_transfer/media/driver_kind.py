@@ -37,6 +37,11 @@ CODEC_NOISE = 16
 MOSTLY = 0.995
 """Share of the pixels that have to agree, where a codec has smeared outlines."""
 
+LIT = 0.8
+LIT_LEVEL = 100
+"""U and V run to 255: a fifth of the person's pixels is brighter than this in either. Codecs smear
+colours over outlines, so the part channel is held to its limit in as many only."""
+
 EMPTY_SHARE = 0.1
 """Of a frame of IUV nobody is in at least so much."""
 
@@ -98,9 +103,11 @@ def _was_iuv(image: Frame) -> bool:
     """Whether (I, U, V) look like IUV behind a lossy codec: one channel dark, others not, and much
     of the frame black in all."""
     pixels = image.reshape(-1, 3)
-    high = np.quantile(pixels, MOSTLY, axis=0)
-    dark = high[0] <= PART_COUNT + CODEC_NOISE
-    return bool(dark and high[1:].min() > 100 and _black_share(pixels) > EMPTY_SHARE)
+    person = pixels[(pixels > CODEC_NOISE).any(1)]
+    if len(person) > (1 - EMPTY_SHARE) * len(pixels):
+        return False
+    high = np.quantile(person, LIT, axis=0)
+    return bool(high[0] <= PART_COUNT + CODEC_NOISE and high[1:].min() > LIT_LEVEL)
 
 
 def _black_share(pixels: UInt8[np.ndarray, "N 3"]) -> float:

@@ -85,7 +85,7 @@ class VideoPictures(PictureStream):
 
     def read(self) -> Iterator[Frame]:
         frame_seconds = 1 / self._timing.rate
-        ends = self.start_seconds + frame_seconds / 2
+        middle = self.start_seconds + frame_seconds / 2
         shown: av.VideoFrame | None = None
         picture: Frame | None = None
         index = 0
@@ -94,10 +94,10 @@ class VideoPictures(PictureStream):
                 container.streams.video[0].thread_type = "AUTO"
                 for number, frame in enumerate(container.decode(video=0)):
                     begins = self._begins(frame, number)
-                    while index < self.frame_count and shown is not None and begins > ends:
+                    while index < self.frame_count and shown is not None and begins > middle:
                         picture = self._upright(shown, index) if picture is None else picture
                         yield picture
-                        index, ends = index + 1, ends + frame_seconds
+                        index, middle = index + 1, middle + frame_seconds
                     shown, picture = frame, None
         except FFmpegError as error:
             raise InputError(
