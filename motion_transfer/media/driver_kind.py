@@ -104,7 +104,7 @@ def _was_iuv(image: Frame) -> bool:
     of the frame black in all."""
     pixels = image.reshape(-1, 3)
     person = pixels[(pixels > CODEC_NOISE).any(1)]
-    if len(person) > (1 - EMPTY_SHARE) * len(pixels):
+    if not 0 < len(person) <= (1 - EMPTY_SHARE) * len(pixels):
         return False
     high = np.quantile(person, LIT, axis=0)
     return bool(high[0] <= PART_COUNT + CODEC_NOISE and high[1:].min() > LIT_LEVEL)
