@@ -15,6 +15,7 @@ from typing import Any
 
 from motion_transfer.estimate.clip import ClipSummary, estimate_clip
 from motion_transfer.estimate.opening import open_estimator
+from motion_transfer.media.iuv_image import ChannelOrder
 from motion_transfer.media.iuv_writing import IuvFormat, write_iuv
 from motion_transfer.media.picture_stream import open_pictures
 from motion_transfer.media.publish import publish
@@ -24,7 +25,7 @@ from motion_transfer.render.events import FramesDone, Listener, Notice, Stage
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.plan import frame_range
 
-ORDER = "iuv"
+ORDER: ChannelOrder = "iuv"
 
 
 @dataclass(frozen=True)
