@@ -93,7 +93,10 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
         lambda s: ["--driver", s.folder / "person.png", "--driver-kind", "iuv"],
         r"person\.png is not an IUV image",
     ),
-    "driver IUV and no photo": (["--driver-kind", "pictures"], "nobody was found|mt models fetch"),
+    "driver IUV and no photo": (
+        ["--driver-kind", "pictures"],
+        "nobody was found|mt models fetch|lacks iuv_network|raw pictures need",
+    ),
     "driver too dark to tell": (
         lambda s: ["--driver", s.image("dark.png", np.full((96, 64, 3), 9, np.uint8))],
         "cannot be told whether these are IUV .*--driver-kind iuv or pictures",
