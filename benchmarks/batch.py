@@ -137,6 +137,7 @@ def shared(folder: Path, sizes: Sizes) -> None:
 def overhead(folder: Path, sizes: Sizes) -> None:
     import numpy as np
 
+    from motion_transfer.media.work import WorkFolder
     from motion_transfer.render.engine import TURN_TAKERS, Engine
     from motion_transfer.render.events import ignore
     from motion_transfer.render.options import RenderOptions
@@ -150,11 +151,13 @@ def overhead(folder: Path, sizes: Sizes) -> None:
         weights=random_checkpoint(folder, sizes.preset),
         compile=not sizes.quick,
     )
-    prepared, appearance = prepare(options, ignore)
+    with WorkFolder(options.output) as work:
+        prepared, appearance = prepare(options, work, ignore)
     renderer, reader = prepared.recipe.renderer(appearance), prepared.driver.open()
-    side = renderer.working_size(prepared.plan.window.side)
+    window = prepared.plan.shots[0].window
+    side = renderer.working_size(window.side)
     iuv = reader.read(0, renderer.batch_size)
-    crops = np.stack([prepared.plan.window.cut(frame, side) for frame in iuv])
+    crops = np.stack([window.cut(frame, side) for frame in iuv])
     renderer.render(crops)
     ratios, rates = [], []
     for index in range(sizes.rounds):

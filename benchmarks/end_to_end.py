@@ -26,6 +26,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, befo
 import numpy as np
 from workload import SOURCE, driver_folder, random_checkpoint
 
+from motion_transfer.media.work import WorkFolder
 from motion_transfer.render.engine import Engine
 from motion_transfer.render.events import ignore
 from motion_transfer.render.options import RenderOptions
@@ -58,10 +59,11 @@ def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> N
         weights=random_checkpoint(folder, preset),
     )
     began = time.perf_counter()
-    prepared, appearance = prepare(replace(options, compile=True), ignore)
+    with WorkFolder(options.output) as work:
+        prepared, appearance = prepare(replace(options, compile=True), work, ignore)
     renderer, reader = prepared.recipe.renderer(appearance), prepared.driver.open()
     print(f"nhrr, {preset}: prepared and compiled in {time.perf_counter() - began:.0f} s")
-    window = prepared.plan.window
+    window = prepared.plan.shots[0].window
     crops = np.stack([window.cut(iuv, 256) for iuv in reader.read(0, renderer.batch_size)])
     ratios = []
     for _ in range(rounds):

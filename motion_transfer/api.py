@@ -23,6 +23,7 @@ def render_video(
     *,
     source_iuv: AnyPath | None = None,
     weights: AnyPath | None = None,
+    estimator_model: AnyPath | None = None,
     sheet: AnyPath | None = None,
     audio: AnyPath | None = None,
     frames: str | tuple[int | None, int | None] | None = None,
@@ -34,9 +35,10 @@ def render_video(
     """Render the person of a photo in the motion of a driver.
 
     Args:
-        source: photo; its IUV is looked for beside it unless `source_iuv` is given.
-        driver: folder of IUV images, IUV image, lossless IUV video, `.npy`, `.npz`, or a motion
-            such as `people:walk`.
+        source: photo; its IUV is looked for beside it unless `source_iuv` is given, and estimated
+            where there is none.
+        driver: video, photo or folder of photos of a person; or folder of IUV images, IUV image,
+            lossless IUV video, `.npy`, `.npz`; or a motion such as `people:walk`.
         output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder of PNG.
         audio: file whose sound is laid under, or `"none"`; else the driver's own, if it has any.
         frames: `"10:50"` or `(10, 50)`, half-open.
@@ -50,12 +52,18 @@ def render_video(
     Raises: MotionTransferError (`InputError` for input that cannot be used), saying what is wrong,
         where, and what to do. Nothing half-written is left behind.
     """
-    base = RenderOptions(source=Path(source), driver=Path(driver), output=Path(output), **options)
+    base = RenderOptions(
+        source=Path(source),
+        driver=Path(driver),
+        output=Path(output),
+        weights=_path(weights),
+        estimator_model=_path(estimator_model),
+        **options,
+    )
     return run(
         replace(
             base,
             source_iuv=_path(source_iuv),
-            weights=_path(weights),
             sheet=_path(sheet),
             audio=_path(audio),
             frames=parse_frames(frames) if isinstance(frames, str) else frames or (None, None),

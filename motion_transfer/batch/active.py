@@ -19,7 +19,10 @@ Stage = Literal["begun", "preparing", "rendering", "assembling", "ended"]
 
 def scan_name(options: RenderOptions) -> str:
     """Jobs of one name share a look at their driver."""
-    return _name("scan", options.driver, options.missing, options.iuv_order, options.frames)
+    return _name(
+        *("scan", options.driver, options.missing, options.iuv_order, options.frames),
+        *(options.driver_kind, options.driver_person, options.estimator, options.estimator_model),
+    )
 
 
 def look_name(options: RenderOptions) -> str:
@@ -27,6 +30,7 @@ def look_name(options: RenderOptions) -> str:
     return _name(
         *("look", options.source, options.source_iuv, options.source_iuv_order, options.person),
         *(options.garments, options.renderer, options.weights),
+        *(options.estimator, options.estimator_model),
     )
 
 

@@ -124,13 +124,13 @@ class Scheduler(Outcomes):
         if active.error:
             return None
         if active.stage == "begun":
-            for shared, kind, function in (
-                (active.scan, "scan", tasks.scan),
-                (active.look, "look", tasks.look),
+            for shared, kind, function, more in (
+                (active.scan, "scan", tasks.scan, (self._state.estimates,)),
+                (active.look, "look", tasks.look, ()),
             ):
                 if shared.state == "missing":
                     shared.state = "pending"
-                    return Task(kind, function, (options,), active, shared)
+                    return Task(kind, function, (options, *more), active, shared)
             if active.scan.state == active.look.state == "ready":
                 active.stage = "preparing"
                 blobs = (active.scan.blobs["scan"], active.look.blobs["source"])

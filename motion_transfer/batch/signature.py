@@ -25,14 +25,16 @@ Files = dict[str, list[str]]
 
 
 def source_files(options: RenderOptions) -> Iterator[Path]:
-    """What a source's appearance is made from. Raises: InputError if a photo's IUV is missing."""
-    yield options.source
-    yield options.source_iuv or find_iuv_beside(options.source)
-    for garment in options.garments:
-        yield garment.photo
-        yield garment.iuv or find_iuv_beside(garment.photo)
-    if options.weights_file is not None:
-        yield options.weights_file
+    """What a source's appearance is made from. Raises: InputError if a photo is missing."""
+    photos = [(options.source, options.source_iuv)]
+    photos += [(garment.photo, garment.iuv) for garment in options.garments]
+    for photo, given in photos:
+        yield photo
+        if iuv := given or find_iuv_beside(photo):
+            yield iuv
+    for model in (options.weights_file, options.estimator_model):
+        if model is not None:
+            yield model
 
 
 def driver_files(options: RenderOptions) -> Iterator[Path]:

@@ -25,6 +25,7 @@ class BatchState:
         self.report = output_root / f"{manifest.stem}.report"
         self.pictures = self.report / "pictures"
         self.scratch = self.folder / "scratch"
+        self.estimates = (self.folder / "estimates").absolute()
         self._manifest = manifest
         self._journal = Journal(self.folder / "journal.jsonl")
         self.records = {record["output"]: record for record in self._journal.read()}

@@ -86,8 +86,13 @@ WARM = Warm()
 """Of this worker process."""
 
 
-def scan(options: RenderOptions) -> tuple[bytes, Files, list[str]]:
-    """A driver's scan, its files, and what is worth saying. Raises: InputError, IuvFileError."""
+def scan(options: RenderOptions, folder: Path) -> tuple[bytes, Files, list[str]]:
+    """A driver's scan, its files, and what is worth saying.
+
+    Args:
+        folder: where the IUV of drivers is kept that are raw pictures.
+    Raises: InputError, IuvFileError.
+    """
     from motion_transfer.render.events import Event, Notice
     from motion_transfer.render.prepare import scan_driver
 
@@ -98,7 +103,8 @@ def scan(options: RenderOptions) -> tuple[bytes, Files, list[str]]:
             notices.append(event.message)
 
     files = sign_files(driver_files(options))
-    return pickle.dumps(scan_driver(replace(options, workers=1), listen), 5), files, notices
+    scanned = scan_driver(replace(options, workers=1), folder, listen)
+    return pickle.dumps(scanned, 5), files, notices
 
 
 def look(options: RenderOptions) -> tuple[bytes, bytes, Files]:

@@ -21,6 +21,7 @@ def section(heading: str) -> Any:
 
 
 input_option = section("Input")
+estimate_option = section("Estimator")
 repair_option = section("Repair")
 output_option = section("Output")
 
@@ -68,25 +69,88 @@ def with_options(*groups: tuple[Any, ...]) -> Any:
 
 
 class IuvGroup(click.Group):
-    """A group that, once it has a command `estimate`, needs not be told so: `mt iuv me.jpg`."""
+    """A group whose command `estimate` needs not be named: `mt iuv me.jpg`."""
 
     default = "estimate"
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         names = (*self.commands, *self.get_help_option_names(ctx))
-        if args and self.default in self.commands and args[0] not in names:
+        if args and args[0] not in names:
             args = [self.default, *args]
         return super().parse_args(ctx, args)
 
 
 @click.group(cls=IuvGroup)
 def iuv() -> None:
-    """Convert IUV between formats, and repair it.
+    """IUV from raw pictures; convert IUV between formats, and repair it.
 
     \b
+    mt iuv me.jpg -o me_IUV.png
+    mt iuv dance.mp4 -o dance.mkv
     mt iuv convert results.pkl -o dance_iuv/
     mt iuv repair dance_iuv/ -o steady.mkv --fill-gaps interpolate --speckle 20 --smooth
     """
+
+
+@iuv.command(cls=SectionCommand)
+@click.argument("source", metavar="PHOTO|VIDEO|DIR", type=FILE)
+@estimate_option(
+    "--estimator",
+    default="blazepose",
+    metavar="blazepose|densepose",
+    help="blazepose (default; needs `mt models fetch`, once), or densepose, with its --model.",
+)
+@estimate_option(
+    "--model",
+    type=FILE,
+    metavar="FILE",
+    help="DensePose, TorchScript or .onnx. A TorchScript file is a program: it is run.",
+)
+@input_option(
+    "--person",
+    default="all",
+    metavar="WHO",
+    help="all (default), largest, an index from the left (0 first), or a box x0,y0,x1,y1.",
+)
+@input_option(
+    "--missing",
+    default="background",
+    metavar="hold|background|fail",
+    help="Frames in which nobody is found: repeat the frame before, background (default), or stop.",
+)
+@with_options(OUTPUT_OPTIONS)
+def estimate(source: Path, output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
+    """Find the people of raw pictures and write their IUV.
+
+    Photos are turned upright as their EXIF says, videos as their rotation flag says. A video's
+    frame rate is kept; a varying one becomes its mean. A folder of pictures is taken as the frames
+    of a clip. People are followed until the shot changes.
+
+    \b
+    mt iuv me.jpg -o me_IUV.png
+    mt iuv dance.mp4 -o dance.mkv --person largest
+    mt iuv dance.mp4 -o dance_iuv/ --estimator densepose --model densepose.pt
+    """
+    from motion_transfer.estimate.run import EstimateOptions, estimate_iuv
+    from motion_transfer.render.missing import list_stretches
+    from motion_transfer.render.options import parse_rate
+
+    settings = EstimateOptions(
+        source=source, output=output, frame_rate=parse_rate(fps) if fps else None, **options
+    )
+    with CountBar("finding people", unit="frame", quiet=quiet) as bar:
+        report = estimate_iuv(settings, bar.advance)
+    if quiet:
+        return
+    _say_notes(report.notes)
+    seen = report.summary
+    if seen.empty:
+        shown = {"hold": "the frame before", "background": "background only"}[settings.missing]
+        times = list_stretches(seen.empty, 0, report.frame_rate)
+        _say_notes([f"nobody found in {seen.empty_count} frames, {shown}: {times}"])
+    shots = f", {len(seen.shots)} shots" if len(seen.shots) > 1 else ""
+    people = f", up to {seen.most_people} people" if seen.most_people > 1 else ""
+    click.echo(f"wrote {output}: {seen.frame_count} frames{shots}{people}")
 
 
 @iuv.command(cls=SectionCommand)

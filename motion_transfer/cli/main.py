@@ -21,7 +21,7 @@ COMMANDS = {
     "people": "Synthetic people: photos with exact IUV, and drivers from motion.",
     "models": "The networks that find people in raw pictures: fetch them.",
     "eval": "Score renderers, and other methods' pictures, on the same pairs.",
-    "iuv": "Convert IUV between formats, and repair it.",
+    "iuv": "IUV from photos and videos; convert IUV between formats, repair it.",
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",
     "info": "Versions, device, renderers, sizes of a run; part names.",
 }

@@ -17,7 +17,11 @@ from tqdm import tqdm
 
 from motion_transfer.render.events import Event, Finished, FramesDone, Listener, Notice, Stage
 
-STAGE_WORDS = {"scan": "reading driver", "render": "rendering"}
+STAGE_WORDS = {
+    "estimate": "finding the driver's person",
+    "scan": "reading driver",
+    "render": "rendering",
+}
 RENDERER_WORDS = {
     "texture": "texture renderer: a draft, no network",
     "nhrr": "nhrr renderer",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +30,13 @@ class Photo:
     alpha: UInt8[np.ndarray, "H W"] | None
     turned: bool
 
+    def on_white(self) -> UInt8[np.ndarray, "H W 3"]:
+        """The picture as it looks on paper: where it is transparent, white shows."""
+        if self.alpha is None or self.alpha.min() == 255:
+            return self.rgb
+        weight = self.alpha[..., None].astype(np.uint16)
+        return ((self.rgb * weight + 255 * (255 - weight) + 127) // 255).astype(np.uint8)
+
 
 def read_bytes(path: Path, what: str) -> bytes:
     """A file's content. Raises: InputError naming what the file was wanted for."""
@@ -47,7 +55,11 @@ def read_photo(path: Path, what: str = "source") -> Photo:
     """
     data = read_bytes(path, what)
     try:
-        with Image.open(io.BytesIO(data)) as file:
+        # up to twice Pillow's limit a picture is large, and no attack
+        with (
+            warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning),
+            Image.open(io.BytesIO(data)) as file,
+        ):
             turned = file.getexif().get(0x0112, 1) not in (0, 1)
             image = ImageOps.exif_transpose(file)
             if image.mode.startswith("I"):  # 16-bit grey; convert() would clip, not scale

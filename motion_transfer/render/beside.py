@@ -12,15 +12,11 @@ def list_iuv_names(photo: Path) -> list[Path]:
     return [photo.with_name(f"{photo.stem}_{word}.png") for word in ("IUV", "iuv")]
 
 
-def find_iuv_beside(photo: Path) -> Path:
-    """`<stem>_IUV.png` or `<stem>_iuv.png` next to a photo. Raises: InputError if neither is."""
+def find_iuv_beside(photo: Path) -> Path | None:
+    """`<stem>_IUV.png` or `<stem>_iuv.png` next to a photo; None: it has to be estimated.
+
+    Raises: InputError if there is no such photo.
+    """
     if not photo.exists():
         raise InputError(f"source {photo} does not exist")
-    candidates = list_iuv_names(photo)
-    for candidate in candidates:
-        if candidate.exists():
-            return candidate
-    raise InputError(
-        f"no IUV found for {photo}: neither {candidates[0].name} nor {candidates[1].name} is beside"
-        " it; make one with DensePose and name it with --source-iuv"
-    )
+    return next((path for path in list_iuv_names(photo) if path.exists()), None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import UInt8
 
@@ -39,8 +40,9 @@ class Canvas:
         """An output frame from a target IUV, its crop, and what was rendered for the crop."""
         frame = self.background.copy()
         if self.crop:
-            paste(frame, rgba, Window(0, 0, len(rgba)))
-            iuv = crop
+            side = len(frame)  # of the largest shot's window; others are enlarged to it
+            paste(frame, rgba, Window(0, 0, side))
+            iuv = cv2.resize(crop, (side, side), interpolation=cv2.INTER_NEAREST_EXACT)
         else:
             paste(frame, rgba, window)
         return self.comparison.frame(iuv, frame) if self.comparison else frame

@@ -12,6 +12,8 @@ from motion_transfer.render.source import Source
 from motion_transfer.render.window import Window
 
 PERSON_GROWTH = 0.05  # of the person's height: hair and clothes reach beyond the IUV by about that
+ALPHA_GROWTH = 0.02  # likewise, where alpha shows them: single hairs and their shadow
+FAINT_ALPHA = 32  # of 255
 PART_COLOUR_STEP = 10  # 24 parts over 0..240, as DensePose draws them
 
 Frame = UInt8[np.ndarray, "H W 3"]
@@ -31,7 +33,7 @@ def make_background(
         return np.full((height, width, 3), colour, np.uint8)
     photo = source.photo.rgb
     if not in_place:
-        photo = remove_person(photo, source.iuv)
+        photo = remove_person(photo, source.iuv, source.alpha)
     scale = max(height / photo.shape[0], width / photo.shape[1])
     covering = (
         max(width, round(photo.shape[1] * scale)),
@@ -44,11 +46,18 @@ def make_background(
     return np.ascontiguousarray(photo[top : top + height, left : left + width])
 
 
-def remove_person(photo: Frame, iuv: UInt8[np.ndarray, "H W 3"]) -> Frame:
-    """The photo with its person painted over from around."""
+def remove_person(
+    photo: Frame,
+    iuv: UInt8[np.ndarray, "H W 3"],
+    alpha: UInt8[np.ndarray, "H W"] | None = None,
+) -> Frame:
+    """The photo with its person painted over from around; alpha knows hair and clothes, too."""
     mask = occupancy(iuv)
+    growth = PERSON_GROWTH
+    if alpha is not None:
+        mask, growth = mask | (alpha >= FAINT_ALPHA).astype(np.uint8), ALPHA_GROWTH
     rows = np.flatnonzero(mask.any(1))
-    radius = max(2, (rows[-1] - rows[0] + 1) * PERSON_GROWTH)
+    radius = max(2, (rows[-1] - rows[0] + 1) * growth)
     scale = min(1, 512 / max(photo.shape[:2]))  # the fill is smooth, and slow at full size
     small_size = (max(1, round(photo.shape[1] * scale)), max(1, round(photo.shape[0] * scale)))
     grown = cv2.dilate(mask, disc(radius))

@@ -6,8 +6,10 @@ import platform
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from motion_transfer.errors import InputError
+from motion_transfer.estimate.opening import estimator_facts
 from motion_transfer.media.formats import OutputFormat
 from motion_transfer.media.work import digest_of, key_of
 from motion_transfer.render.beside import find_iuv_beside
@@ -21,6 +23,7 @@ LIBRARIES = ("torch", "numpy", "opencv-contrib-python-headless", "av", "pillow",
 SAID_OTHERWISE = {
     *("source", "source_iuv", "garments", "weights"),  # by the files' content
     *("driver", "driver_person", "iuv_order", "missing", "frames", "frame_rate"),  # by the plan
+    *("driver_kind", "estimator", "estimator_model"),  # by the source and the plan
     *("renderer", "compile", "codec", "crf"),  # by the recipe and the format
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio"),  # made when everything is drawn
@@ -41,13 +44,14 @@ def source_key(options: RenderOptions, recipe: Recipe) -> str:
     """Of everything that decides a source's appearance. Raises: InputError for a missing file."""
     files = [("source", options.source, options.source_iuv)]
     files += [("garment", garment.photo, garment.iuv) for garment in options.garments]
+    content = []
+    for what, photo, given in files:
+        iuv = given or find_iuv_beside(photo)
+        content.append(digest_file(photo, what))
+        content.append(digest_file(iuv, what) if iuv else _estimator_facts(options))
     return key_of(
         {
-            "content": [
-                digest_file(path, what)
-                for what, photo, iuv in files
-                for path in (photo, iuv or find_iuv_beside(photo))
-            ],
+            "content": content,
             "parts": [garment.parts for garment in options.garments],
             "person": options.person,
             "order": options.source_iuv_order,
@@ -79,7 +83,7 @@ def run_key(
             "thumbnails": options.sheet is not None,
             "renderer": [recipe.name, recipe.weights_digest, recipe.compile],
             "format": [asdict(output_format), options.output.suffix.lower()],
-            "window": asdict(plan.window),
+            "shots": [asdict(shot) for shot in plan.shots],
             "rate": plan.frame_rate,
             "device": _device(),
             "versions": [__version__, *(version(name) for name in LIBRARIES)],
@@ -93,6 +97,22 @@ def chunk_key(run: str, plan: DriverPlan, chunk: Chunk) -> str:
     return key_of(
         {"run": run, "start": chunk.start, "frames": [[f.digest, str(f.person)] for f in frames]}
     )
+
+
+def driver_key(options: RenderOptions) -> str:
+    """Of what decides the IUV of a driver that is raw pictures. Raises: InputError."""
+    return key_of(
+        {
+            "driver": digest_file(options.driver, "driver"),
+            "person": options.driver_person,
+            "frames": options.frames,
+            **_estimator_facts(options),
+        }
+    )
+
+
+def _estimator_facts(options: RenderOptions) -> dict[str, Any]:
+    return estimator_facts(options.estimator, options.estimator_model)
 
 
 def _device() -> list[str]:

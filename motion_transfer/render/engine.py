@@ -24,6 +24,7 @@ from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
 from motion_transfer.render.prepare import Prepared
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.sheet import ContactSheet
+from motion_transfer.render.window import Window
 
 TURN_TAKERS = 2  # threads for a renderer that takes turns: one's batch is drawn while another
 # decodes and encodes
@@ -105,28 +106,34 @@ class Engine:
         finished(chunk, path)
 
     def _render_batches(self, chunk: Chunk) -> Iterator[list[Image]]:
-        """Output frames of a chunk, a batch at a time; batches begin at the chunk's start."""
-        window, canvas = self._plan.window, self._prepared.canvas
-        size = self._renderer.working_size(window.side)
+        """Output frames of a chunk, a batch at a time; batches begin where chunk or shot does."""
         frames = self._read(chunk)
-        while batch := list(islice(frames, self._renderer.batch_size)):
-            if self._stop.is_set():
-                raise StoppedError
-            crops = np.zeros((self._renderer.batch_size, size, size, 3), np.uint8)
-            for slot, iuv in enumerate(batch):
-                crops[slot] = window.cut(iuv, size)
-            try:
-                results = self._draw(crops)
-            except (RuntimeError, MemoryError) as error:  # what torch raises, out of memory too
-                first = self._plan.first + chunk.start
-                raise RenderError(
-                    f"the {self._renderer.name} renderer failed in the driver's frames {first} to"
-                    f" {first + chunk.stop - chunk.start - 1}: {error}"
-                ) from error
-            yield [
-                canvas.lay_out(iuv, crop, rgba, window)
-                for iuv, crop, rgba in zip(batch, crops, results, strict=False)
-            ]
+        for shot in self._plan.shots_in(chunk):
+            for start in range(shot.start, shot.stop, self._renderer.batch_size):
+                count = min(self._renderer.batch_size, shot.stop - start)
+                if self._stop.is_set():
+                    raise StoppedError
+                yield self._render_batch(list(islice(frames, count)), start, shot.window)
+
+    def _render_batch(self, batch: list[Image], start: int, window: Window) -> list[Image]:
+        """Output frames from those of the driver, the first of which makes frame `start`."""
+        canvas = self._prepared.canvas
+        size = self._renderer.working_size(window.side)
+        crops = np.zeros((self._renderer.batch_size, size, size, 3), np.uint8)
+        for slot, iuv in enumerate(batch):
+            crops[slot] = window.cut(iuv, size)
+        try:
+            results = self._draw(crops)
+        except (RuntimeError, MemoryError) as error:  # what torch raises, out of memory too
+            first = self._plan.first + start
+            raise RenderError(
+                f"the {self._renderer.name} renderer failed in the driver's frames {first} to"
+                f" {first + len(batch) - 1}: {error}"
+            ) from error
+        return [
+            canvas.lay_out(iuv, crop, rgba, window)
+            for iuv, crop, rgba in zip(batch, crops, results, strict=False)
+        ]
 
     def _read(self, chunk: Chunk) -> Iterator[Image]:
         """The IUV frames that the chunk shows, with only the followed person in them."""

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any, Literal
 
 Kind = Literal["path", "text", "integer", "rate", "frames", "flag", "switch", "garments"]
-Section = Literal["Source", "Driver", "Garment transfer", "Rendering", "Output"]
+Section = Literal["Source", "Driver", "Raw pictures", "Garment transfer", "Rendering", "Output"]
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,15 @@ from motion_transfer.render.option import REQUIRED, Option, list_options, option
 from motion_transfer.weights.shipped import DEFAULT_WEIGHTS, find_weights
 
 if TYPE_CHECKING:  # help has to be instant, and these need the libraries that do the work
+    from motion_transfer.media.driver_kind import DriverKind
     from motion_transfer.media.iuv_image import ChannelOrder
     from motion_transfer.media.iuv_stream import Missing
 
 CHANNEL_ORDERS = ("iuv", "vui")
 MISSING = ("hold", "background", "fail")
 RENDERERS = ("nhrr", "texture")
+ESTIMATORS = ("blazepose", "densepose")
+DRIVER_KINDS = ("iuv", "pictures")
 NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
 DEFAULT_RATE = Fraction(30)
@@ -40,10 +43,11 @@ class Garment:
 class RenderOptions:
     """The options of a run: what `mt run` takes, what a manifest's jobs may set, and its defaults.
 
-    Paths of drivers may name a motion, `people:walk` (see `people.stream`). `frames` is a half-open
-    range of the driver's frames, either end open. `weights` may name a checkpoint that ships, and
-    None is the default one; a `frame_rate` of None is the driver's own, or 30; `audio` None is the
-    driver's own, if it has one; `missing` None fails for numbers missing from a folder, and shows
+    Paths of drivers may name a motion, `people:walk` (see `people.stream`). The IUV of photos and
+    drivers that come without one is estimated; `driver_kind` None finds out which do. `frames` is a
+    half-open range of the driver's frames, either end open. `weights` may name a checkpoint that
+    ships, and None is the default one; a `frame_rate` of None is the driver's own, or 30; `audio`
+    None is its own if it has one; `missing` None fails for numbers missing from a folder, and shows
     background where nobody is found. Nothing here but the content of the inputs and what is drawn
     decides the output's bytes: `workers` never does.
     """
@@ -54,7 +58,7 @@ class RenderOptions:
     source_iuv: Path | None = option(
         "--source-iuv",
         "Source",
-        "Its IUV; else STEM_IUV.png or STEM_iuv.png beside it.",
+        "Its IUV; else STEM_IUV.png or STEM_iuv.png beside it; else it is estimated.",
         kind="path",
     )
     person: str = option(
@@ -74,10 +78,17 @@ class RenderOptions:
     driver: Path = option(
         "--driver",
         "Driver",
-        "Folder of IUV images, one IUV image, lossless IUV video, .npy, .npz, detectron2's"
-        " results.pkl, or people:MOTION (such as people:walk,frames=60; see `mt people drive -h`).",
+        "A video or pictures of a person; or IUV: a folder of images, one image, lossless video,"
+        " .npy, .npz, detectron2's results.pkl; or people:MOTION (such as people:walk,frames=60;"
+        " see `mt people drive -h`).",
         kind="path",
         default=REQUIRED,
+    )
+    driver_kind: DriverKind | None = option(
+        "--driver-kind",
+        "Driver",
+        "iuv, or pictures of a person whose IUV is estimated; else found out.",
+        choices=DRIVER_KINDS,
     )
     driver_person: str = option(
         "--driver-person",
@@ -108,6 +119,20 @@ class RenderOptions:
         default=(None, None),
         metavar="A:B",
     )
+    estimator: str = option(
+        "--estimator",
+        "Raw pictures",
+        "blazepose (default; needs `mt models fetch`, once), or densepose, with its model.",
+        default="blazepose",
+        choices=ESTIMATORS,
+    )
+    estimator_model: Path | None = option(
+        "--estimator-model",
+        "Raw pictures",
+        "DensePose, TorchScript or .onnx. A TorchScript file is a program: it is run.",
+        kind="path",
+        metavar="FILE",
+    )
     garments: tuple[Garment, ...] = option(
         "--garment --garment-parts",
         "Garment transfer",
@@ -132,7 +157,7 @@ class RenderOptions:
     background: str = option(
         "--background",
         "Rendering",
-        "white (default), black, #rrggbb, or photo (the source's, without the person).",
+        "white (default), black, #rrggbb, or photo (the source's, painted over behind the person).",
         default="white",
         metavar="COLOUR",
     )
@@ -212,6 +237,12 @@ class RenderOptions:
                 raise InputError(f"{entry.name} is {value!r}; supported are {listed}")
         if self.renderer == "texture" and self.weights is not None:
             raise InputError("the texture renderer uses no weights; leave out --weights")
+        if self.estimator == "densepose" and self.estimator_model is None:
+            raise InputError("the densepose estimator needs --estimator-model FILE; none ships")
+        if self.estimator != "densepose" and self.estimator_model is not None:
+            raise InputError(
+                "--estimator-model is for the densepose estimator; add --estimator densepose"
+            )
         if self.workers is not None and self.workers < 1:
             raise InputError(f"workers is {self.workers}; it must be at least 1")
         parse_colour(self.background)

@@ -14,6 +14,8 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from motion_transfer.errors import InputError
+from motion_transfer.estimate.choice import choose_box
+from motion_transfer.estimate.interface import Box
 
 SMALLEST_SHARE = 0.0005  # of the image; a smaller region alone is a speck, not a person
 FRAGMENT_SHARE = 0.25  # of the person; a larger region is somebody else
@@ -86,37 +88,18 @@ def choose_person(people: People, choice: str, where: str) -> Person:
     persons = people.persons
     if not persons:
         raise InputError(f"{where}: no person in it, every pixel is background")
-    if choice == "largest":
-        return persons[0]
-    numbers = parse_person(choice)
-    if len(numbers) == 1:
-        if numbers[0] >= len(persons):
-            raise InputError(
-                f"{where}: person {numbers[0]} asked for, but only {len(persons)} found"
-                f" (they count from 0, from the left)"
-            )
-        return sorted(persons, key=lambda person: person.x0 + person.x1)[numbers[0]]
-    box = Person(*numbers, pixels=0, regions=())
-    best = max(persons, key=box.overlap)
-    if box.overlap(best) == 0:
-        boxes = "; ".join(f"{p.x0},{p.y0},{p.x1},{p.y1}" for p in persons)
-        raise InputError(f"{where}: nobody in the box {choice}; people are at {boxes}")
-    return best
+    boxes = [Box(p.x0, p.y0, p.x1, p.y1) for p in persons]
+    return persons[choose_box(boxes, [p.pixels for p in persons], choice, where)]
 
 
-def parse_person(choice: str) -> tuple[int, ...]:
-    """The index or box in a choice other than `largest`. Raises: InputError."""
-    try:
-        numbers = tuple(int(number) for number in choice.split(","))
-    except ValueError:
-        numbers = ()
-    box = len(numbers) == 4 and numbers[0] < numbers[2] and numbers[1] < numbers[3]
-    if not box and not (len(numbers) == 1 and numbers[0] >= 0):
-        raise InputError(
-            f"person {choice!r}; write largest, an index from the left (0 first), or a box"
-            " x0,y0,x1,y1 in pixels"
-        )
-    return numbers
+def take_as_one(iuv: UInt8[np.ndarray, "H W 3"]) -> People:
+    """The people of an image that is known to show one person at most, in however many pieces."""
+    rows, columns = (np.flatnonzero(iuv[..., 0].any(axis)) for axis in (1, 0))
+    if not len(rows):
+        return People((), 0)
+    box = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+    pixels = int(np.count_nonzero(iuv[..., 0]))
+    return People((Person(*box, pixels, regions=(1,)),), 1)
 
 
 def follow(frames: Sequence[People], first: Person) -> list[Person | None]:

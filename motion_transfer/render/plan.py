@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -21,7 +22,14 @@ from motion_transfer.render.missing import (
     list_stretches,
     missing_stretches,
 )
-from motion_transfer.render.person import People, choose_person, find_people, follow
+from motion_transfer.render.person import (
+    People,
+    Person,
+    choose_person,
+    find_people,
+    follow,
+    take_as_one,
+)
 from motion_transfer.render.window import Window, plan_window
 
 CHUNK_FRAMES = 48
@@ -64,19 +72,40 @@ class SeenFrame:
 
 
 @dataclass(frozen=True)
+class Shot:
+    """A half-open range of output frames, and the crop window that is steady in it."""
+
+    start: int
+    stop: int
+    window: Window
+
+
+@dataclass(frozen=True)
 class DriverPlan:
     """What the engine needs to know of a driver.
 
     Attributes:
         first: the driver's frame that becomes output frame 0.
         frames: one entry for each output frame.
-        window: the crop window, steady for all of them.
+        shots: one after the other, they cover the frames.
     """
 
     first: int
     frames: tuple[FramePlan, ...]
-    window: Window
+    shots: tuple[Shot, ...]
     frame_rate: Fraction
+
+    def shots_in(self, chunk: Chunk) -> Iterator[Shot]:
+        """The pieces of shots that a chunk shows."""
+        for shot in self.shots:
+            start, stop = max(shot.start, chunk.start), min(shot.stop, chunk.stop)
+            if start < stop:
+                yield Shot(start, stop, shot.window)
+
+    @property
+    def largest_side(self) -> int:
+        """Of the windows, px."""
+        return max(shot.window.side for shot in self.shots)
 
     @property
     def chunks(self) -> list[Chunk]:
@@ -103,15 +132,24 @@ def frame_range(frames: tuple[int | None, int | None], count: int, where: str) -
 
 
 def scan_people(
-    reader: IuvReader, frames: range, workers: int, done: Callable[[int], None]
+    reader: IuvReader,
+    frames: range,
+    workers: int,
+    done: Callable[[int], None],
+    *,
+    one_person: bool = False,
 ) -> list[SeenFrame]:
-    """Everybody in each frame, decoded in parallel; nothing but boxes and digests is kept."""
+    """Everybody in each frame, decoded in parallel; nothing but boxes and digests is kept.
+
+    Args:
+        one_person: whatever is in a frame belongs to one person, as whoever made it says.
+    """
+    find = take_as_one if one_person else find_people
 
     def scan(start: int) -> list[SeenFrame]:
         block = range(start, min(start + SCAN_FRAMES, frames.stop))
         found = [
-            SeenFrame(find_people(iuv), digest_of_iuv(iuv))
-            for iuv in reader.read(block.start, block.stop)
+            SeenFrame(find(iuv), digest_of_iuv(iuv)) for iuv in reader.read(block.start, block.stop)
         ]
         done(len(found))
         return found
@@ -130,21 +168,25 @@ def plan_path(
     *,
     chosen: range,
     frame_rate: Fraction,
-    person: str,
+    person: str | None,
     where: str,
     where_first: str,
     where_found: str,
     missing: Missing | None = None,
+    cuts: Sequence[int] = (),
 ) -> DriverPlan:
-    """Follow the chosen person through the driver and lay the window around the whole path.
+    """Follow the chosen person through the driver and lay a window around the path in each shot.
 
     Args:
         chosen: the driver's frames that were seen.
+        person: whom to follow, see `choose_person`; None: whoever is there is the one.
         where, where_first, where_found: the driver, the first of those frames, and the first of
             them with somebody, for messages.
         missing: what becomes of frames in which the person is not found: `fail`, `hold` (the frame
             before is repeated; at the start, the first one with somebody) or `background`; None:
             `background`, but somebody has to be in the first frame.
+        cuts: the driver's frames with which shots begin, in order. In a later shot the person is
+            chosen anew; whom the choice does not find there, the largest replaces.
     Raises: InputError if nobody is in any frame, or in one where `missing` asks for somebody.
     """
     people = [frame.people for frame in seen]
@@ -157,8 +199,11 @@ def plan_path(
             f" --frames {chosen.start + inhabited}:{chosen.stop}, or add --missing hold or"
             " --missing background"
         )
-    first = choose_person(people[inhabited], person, where_found)
-    path = [None] * inhabited + follow(people[inhabited:], first)
+    ends = [0, *(cut - chosen.start for cut in cuts if chosen.start < cut < chosen.stop)]
+    ranges = list(pairwise([*ends, len(people)]))
+    path: list[Person | None] = []
+    for start, stop in ranges:
+        path += _path_in_shot(people[start:stop], person, where_found, strict=not any(path))
     plans = tuple(
         FramePlan(
             who,
@@ -175,4 +220,36 @@ def plan_path(
         )
     if missing == "hold":
         plans = hold_frames(plans, chosen.start)
-    return DriverPlan(chosen.start, plans, plan_window(path), frame_rate)
+    return DriverPlan(chosen.start, plans, _lay_windows(plans, ranges), frame_rate)
+
+
+def _path_in_shot(
+    people: Sequence[People], person: str | None, where: str, *, strict: bool
+) -> list[Person | None]:
+    """The chosen person in every frame of a shot; `strict`: nobody else will do."""
+    if person is None:
+        return [frame.persons[0] if frame.persons else None for frame in people]
+    found = next((i for i, frame in enumerate(people) if frame.persons), None)
+    if found is None:
+        return [None] * len(people)
+    try:
+        first = choose_person(people[found], person, where)
+    except InputError:
+        if strict:
+            raise
+        first = people[found].persons[0]
+    return [None] * found + follow(people[found:], first)
+
+
+def _lay_windows(plans: Sequence[FramePlan], ranges: Sequence[tuple[int, int]]) -> tuple[Shot, ...]:
+    """A window for each shot; one without anybody is drawn in its neighbour's."""
+    windows = [
+        plan_window(path) if any(path := [plan.person for plan in plans[start:stop]]) else None
+        for start, stop in ranges
+    ]
+    last = next(window for window in windows if window is not None)
+    shots = []
+    for (start, stop), window in zip(ranges, windows, strict=True):
+        last = window or last
+        shots.append(Shot(start, stop, last))
+    return tuple(shots)

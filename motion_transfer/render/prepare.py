@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from motion_transfer.errors import OutputError
+from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.audio import AudioCut, choose_audio
+from motion_transfer.media.driver_kind import tell_kind
 from motion_transfer.media.formats import OutputFormat
 from motion_transfer.media.iuv_image import ChannelOrder
 from motion_transfer.media.iuv_stream import IuvReader, Missing, list_gaps, open_reader, open_stream
@@ -18,6 +19,7 @@ from motion_transfer.render.compose import Comparison, make_background
 from motion_transfer.render.content import chunk_key, digest_file, run_key, source_key
 from motion_transfer.render.events import FramesDone, Listener, Notice, Stage
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
+from motion_transfer.render.picture_driver import PictureDriver, estimate_driver
 from motion_transfer.render.plan import (
     DriverPlan,
     SeenFrame,
@@ -55,6 +57,7 @@ class DriverScan:
         frame_rate: the driver's own, if it has one.
         where_first, where_found: the first of the frames, and the first of them with somebody (if
             there is one), for messages.
+        pictures: where the driver is raw pictures: what was made of them.
     """
 
     file: DriverFile
@@ -65,6 +68,7 @@ class DriverScan:
     seen: list[SeenFrame]
     where_first: str
     where_found: str
+    pictures: PictureDriver | None = None
 
 
 @dataclass(frozen=True)
@@ -84,13 +88,20 @@ class Prepared:
     chunk_keys: tuple[str, ...]
 
 
-def scan_driver(options: RenderOptions, listener: Listener) -> DriverScan:
-    """Decode a driver once. Raises: InputError; IuvFileError naming the frame that is broken."""
+def scan_driver(options: RenderOptions, folder: Path, listener: Listener) -> DriverScan:
+    """Decode a driver once; find its IUV first if it is raw pictures.
+
+    Args:
+        folder: where the IUV of pictures is kept.
+    Raises: InputError; IuvFileError naming the frame that is broken.
+    """
     if is_motion(options.driver):
         from motion_transfer.people.figure.body import FIRST_USE, is_cached
 
         if not is_cached():
             listener(Notice(FIRST_USE))
+    elif _are_pictures(options):
+        return _scan_pictures(options, folder, listener)
     missing = options.missing or "fail"
     stream = _open_stream(options.driver, missing)
     if stream.gaps:
@@ -117,17 +128,52 @@ def scan_driver(options: RenderOptions, listener: Listener) -> DriverScan:
     )
 
 
+def _are_pictures(options: RenderOptions) -> bool:
+    """Raises: InputError if there is no such driver, or it cannot be told what it is."""
+    if not options.driver.exists():
+        raise InputError(f"driver {options.driver} does not exist")
+    return (options.driver_kind or tell_kind(options.driver)) == "pictures"
+
+
+def _scan_pictures(options: RenderOptions, folder: Path, listener: Listener) -> DriverScan:
+    pictures = estimate_driver(options, folder, listener)
+    file = DriverFile(pictures.iuv, "fail", "iuv")
+    reader = file.open()
+    chosen = frame_range(options.frames, reader.stream.frame_count, str(options.driver))
+    listener(Stage("scan", len(chosen)))
+    seen = scan_people(
+        reader,
+        chosen,
+        options.worker_count,
+        lambda count: listener(FramesDone(count)),
+        one_person=True,
+    )
+    found = next((i for i, frame in enumerate(seen) if frame.people.persons), 0)
+    return DriverScan(
+        file,
+        reader.height,
+        reader.width,
+        pictures.frame_rate,
+        chosen,
+        seen,
+        f"frame {chosen.start} of {options.driver}",
+        f"frame {chosen.start + found} of {options.driver}",
+        pictures,
+    )
+
+
 def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
     """Whom to follow and where the window lies. Raises: InputError, OutputError."""
     return plan_path(
         scan.seen,
         chosen=scan.chosen,
         frame_rate=options.frame_rate or scan.frame_rate or DEFAULT_RATE,
-        person=options.driver_person,
+        person=None if scan.pictures else options.driver_person,
         where=str(options.driver),
         where_first=scan.where_first,
         where_found=scan.where_found,
         missing=options.missing,
+        cuts=scan.pictures.cuts if scan.pictures else (),
     )
 
 
@@ -146,7 +192,9 @@ def prepare_run(
     source: Source,
 ) -> Prepared:
     """The parts put together. Raises: InputError, OutputError."""
-    in_place = options.driver.resolve() == source.iuv_path.resolve()
+    driver = options.driver.resolve()
+    in_place = driver in (options.source.resolve(), source.iuv_path and source.iuv_path.resolve())
+    begins = scan.pictures.start_seconds if scan.pictures else 0
     key = run_key(
         options,
         source=source_key(options, recipe),
@@ -166,7 +214,7 @@ def prepare_run(
             options.output,
             output_format,
             driver=options.driver,
-            start_seconds=plan.first / (scan.frame_rate or plan.frame_rate),
+            start_seconds=begins + plan.first / (scan.frame_rate or plan.frame_rate),
             duration_seconds=len(plan.frames) / plan.frame_rate,
         ),
         chunk_keys=tuple(chunk_key(key, plan, chunk) for chunk in plan.chunks),
@@ -201,7 +249,7 @@ def _canvas(
     in_place: bool,
 ) -> Canvas:
     if options.size == "crop":
-        height = width = recipe.working_size(plan.window.side)
+        height = width = recipe.working_size(plan.largest_side)
     else:
         height, width = scan.height, scan.width
     if options.size == "even":

@@ -82,7 +82,7 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
     choose_format(options.output, codec=options.codec, crf=options.crf)
     check_destinations(options)
     with WorkFolder(options.output, restart=options.restart) as work:
-        prepared, appearance = prepare(options, listener)
+        prepared, appearance = prepare(options, work, listener)
         render_began = time.perf_counter()
         _render(options, prepared, appearance, work, listener)
     ended = time.perf_counter()
@@ -123,10 +123,14 @@ def check_destinations(options: RenderOptions) -> None:
         check_destination(options.sheet, force=options.force or ours)
 
 
-def prepare(options: RenderOptions, listener: Listener) -> tuple[Prepared, Appearance]:
+def prepare(
+    options: RenderOptions, work: WorkFolder, listener: Listener
+) -> tuple[Prepared, Appearance]:
     """Everything that comes before the first frame. Raises: InputError and its kinds."""
     output_format = choose_format(options.output, codec=options.codec, crf=options.crf)
-    scan = scan_driver(options, listener)
+    scan = scan_driver(options, work.path, listener)
+    if scan.pictures is not None:  # so that the folder stays if the run is stopped
+        work.note(scan.pictures.iuv.name, scan.pictures.digest, scan.pictures.key)
     plan = plan_run(options, scan)
     check_length(options, output_format, plan)
     recipe = choose_run_recipe(options, plan, listener)

@@ -18,6 +18,7 @@ from motion_transfer.media.iuv_stream import read_single_iuv
 from motion_transfer.render.beside import find_iuv_beside
 from motion_transfer.render.options import Garment, RenderOptions
 from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
+from motion_transfer.render.photo_person import SourcePerson, estimate_person
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
 from nhrr_core.iuv import PART_COUNT, PART_NAMES
 
@@ -38,15 +39,18 @@ class Source:
     Attributes:
         photo: the picture, upright.
         iuv: H x W x 3 uint8, of the chosen person only.
+        iuv_path: None where it was estimated.
         texture: 1 x 3 x T x T in [-1, 1], 0 where nothing is seen.
         visibility: 1 x 1 x T x T, 1 where the texture is seen.
+        alpha: how much of each pixel is the person, 0..255, where the IUV was estimated.
     """
 
     photo: Photo
     iuv: UInt8[np.ndarray, "H W 3"]
-    iuv_path: Path
+    iuv_path: Path | None
     texture: Float[Tensor, "1 3 T T"]
     visibility: Float[Tensor, "1 1 T T"]
+    alpha: UInt8[np.ndarray, "H W"] | None = None
 
 
 def prepare_source(options: RenderOptions, texture_size: int) -> Source:
@@ -57,10 +61,10 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
     """
     photo = read_photo(options.source)
     iuv_path = options.source_iuv or find_iuv_beside(options.source)
-    iuv = read_person(photo, iuv_path, options.person, options.source_iuv_order, "source")
+    person = _find_person(photo, iuv_path, options.person, options, "source")
     taken = {part for garment in options.garments for part in garment.parts}
     kept = tuple(part for part in range(1, PART_COUNT + 1) if part not in taken)
-    layers = [unfold(photo, iuv, kept, texture_size)]
+    layers = [unfold(photo, person.iuv, kept, texture_size, alpha=person.alpha)]
     for number, garment in enumerate(options.garments):
         later = {part for other in options.garments[number + 1 :] for part in other.parts}
         layers.append(_unfold_garment(garment, later, options, texture_size))
@@ -71,7 +75,15 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
             f"source {options.source} shows too little of the body ({share:.1%} of the texture);"
             " use a larger photo, or choose another --person"
         )
-    return Source(photo, iuv, iuv_path, texture, visibility)
+    return Source(photo, person.iuv, iuv_path, texture, visibility, person.alpha)
+
+
+def _find_person(
+    photo: Photo, iuv_path: Path | None, choice: str, options: RenderOptions, what: str
+) -> SourcePerson:
+    if iuv_path is None:
+        return estimate_person(photo, choice, options, what)
+    return SourcePerson(read_person(photo, iuv_path, choice, options.source_iuv_order, what))
 
 
 def unfold(
@@ -180,11 +192,11 @@ def _unfold_garment(
 ) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
     photo = read_photo(garment.photo, "garment")
     path = garment.iuv or find_iuv_beside(garment.photo)
-    iuv = read_person(photo, path, "largest", options.source_iuv_order, "garment")
+    person = _find_person(photo, path, "largest", options, "garment")
     parts = tuple(part for part in garment.parts if part not in later)
-    texture, visibility = unfold(photo, iuv, parts, texture_size)
+    texture, visibility = unfold(photo, person.iuv, parts, texture_size, alpha=person.alpha)
     if parts and not visibility.any():
-        shown = ", ".join(PART_NAMES[part] for part in np.unique(iuv[..., 0]) if part)
+        shown = ", ".join(PART_NAMES[part] for part in np.unique(person.iuv[..., 0]) if part)
         raise InputError(
             f"garment {garment.photo} shows none of {', '.join(PART_NAMES[p] for p in parts)};"
             f" it shows {shown}"

@@ -89,10 +89,22 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
         lambda s: [file.unlink() for file in (s.folder / "driver").iterdir()] and None,
         "holds no IUV images",
     ),
-    "driver is a photo": (
-        lambda s: ["--driver", s.folder / "person.png"],
+    "driver is a photo and no IUV": (
+        lambda s: ["--driver", s.folder / "person.png", "--driver-kind", "iuv"],
         r"person\.png is not an IUV image",
     ),
+    "driver IUV and no photo": (
+        ["--driver-kind", "pictures"],
+        "nobody was found|mt models fetch|lacks iuv_network|raw pictures need",
+    ),
+    "driver too dark to tell": (
+        lambda s: ["--driver", s.image("dark.png", np.full((96, 64, 3), 9, np.uint8))],
+        "cannot be told whether these are IUV .*--driver-kind iuv or pictures",
+    ),
+    "driver kind unknown": (["--driver-kind", "film"], "driver_kind is 'film'"),
+    "estimator unknown": (["--estimator", "magic"], "estimator is 'magic'"),
+    "estimator without its model": (["--estimator", "densepose"], "needs --estimator-model FILE"),
+    "model without its estimator": (["--estimator-model", "a.pt"], "add --estimator densepose"),
     "driver is words": (["--driver", __file__], "is not a readable video"),
     "driver lossy": (
         lambda s: ["--driver", s.video(3, name="a.mp4", codec="libx264", pixels="yuv420p")],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,14 @@ from motion_transfer import render_video
 from motion_transfer.media.iuv_stream import natural_key, open_reader, open_stream
 from motion_transfer.render.options import parse_frames, parse_parts, parse_rate
 from motion_transfer.render.person import People, Person, follow
-from motion_transfer.render.plan import CHUNK_FRAMES, Chunk, DriverPlan, FramePlan, frame_range
+from motion_transfer.render.plan import (
+    CHUNK_FRAMES,
+    Chunk,
+    DriverPlan,
+    FramePlan,
+    Shot,
+    frame_range,
+)
 from motion_transfer.render.window import Window, plan_window
 from nhrr_core import PART_GROUPS, PART_NAMES
 
@@ -136,11 +144,13 @@ def test_chunks_are_a_partition(count: int, data) -> None:
     start = data.draw(st.none() | st.integers(0, count - 1))
     stop = data.draw(st.none() | st.integers((start or 0) + 1, count))
     chosen = frame_range((start, stop), count, "driver")
-    plan = DriverPlan(
-        chosen.start, (FramePlan(None, True),) * len(chosen), Window(0, 0, 16), Fraction(25)
-    )
+    ends = sorted({0, len(chosen), *data.draw(st.lists(st.integers(0, len(chosen))))})
+    shots = tuple(Shot(*ends, Window(0, 0, 16)) for ends in pairwise(ends))
+    plan = DriverPlan(chosen.start, (FramePlan(None, True),) * len(chosen), shots, Fraction(25))
     covered = [i for chunk in plan.chunks for i in range(chunk.start, chunk.stop)]
     assert covered == list(range(len(chosen)))
+    shown = [s for chunk in plan.chunks for s in plan.shots_in(chunk)]
+    assert [i for s in shown for i in range(s.start, s.stop)] == covered
     assert plan.chunks == [Chunk(i, c.start, c.stop) for i, c in enumerate(plan.chunks)]
 
 

@@ -30,6 +30,7 @@ PATIENCE_SECONDS = 1.5  # it takes 0.2 on an idle machine
         ["info", "-h"],
         ["eval", "-h"],
         ["iuv", "repair", "-h"],
+        ["iuv", "estimate", "-h"],
     ],
 )
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
@@ -60,7 +61,10 @@ def test_every_command_has_help(mt, command: str) -> None:
 def test_help_of_run_has_sections_in_order(mt) -> None:
     lines = mt("run", "--help").out.splitlines()
     headings = [line for line in lines if line.endswith(":") and not line.startswith(" ")]
-    assert headings[:5] == ["Source:", "Driver:", "Garment transfer:", "Rendering:", "Output:"]
+    assert headings[:6] == [
+        *("Source:", "Driver:", "Raw pictures:"),
+        *("Garment transfer:", "Rendering:", "Output:"),
+    ]
 
 
 @pytest.mark.parametrize("command", ["run", "eval"])

@@ -17,7 +17,6 @@ from motion_transfer.render.plan import (
     plan_path,
     scan_people,
 )
-from motion_transfer.render.window import Window
 
 
 def plan(studio, iuvs: np.ndarray, **changes) -> DriverPlan:
@@ -37,6 +36,7 @@ def plan(studio, iuvs: np.ndarray, **changes) -> DriverPlan:
         where_first=reader.stream.where(chosen.start),
         where_found=reader.stream.where(chosen.start + found),
         missing=settings.get("missing"),
+        cuts=settings.get("cuts", ()),
     )
 
 
@@ -57,7 +57,7 @@ def test_frames_that_are_not_there(frames: tuple) -> None:
 @pytest.mark.parametrize("count", [1, CHUNK_FRAMES - 1, CHUNK_FRAMES, CHUNK_FRAMES + 1, 200])
 def test_chunks_cover_every_frame_once(count: int) -> None:
     frame = FramePlan(None, alone=True)
-    chunks = DriverPlan(0, (frame,) * count, Window(0, 0, 16), Fraction(25)).chunks
+    chunks = DriverPlan(0, (frame,) * count, (), Fraction(25)).chunks
     assert [i for chunk in chunks for i in range(chunk.start, chunk.stop)] == list(range(count))
     assert all(chunk.start == chunk.index * CHUNK_FRAMES for chunk in chunks)
 
@@ -134,3 +134,49 @@ def test_long_lists_are_cut() -> None:
     text = list_stretches([(2 * i, 2 * i + 1) for i in range(13)], 0, Fraction(1, 60))
     assert text.startswith("0:00.00-1:00.00 (frames 0:1), 2:00.00-3:00.00")
     assert text.endswith("(frames 18:19) and 3 more")
+
+
+def test_each_shot_has_its_own_window_and_person(studio) -> None:
+    """Two shots: somebody on the left, then somebody on the right with a smaller one beside."""
+    frames = np.zeros((8, 96, 240, 3), np.uint8)
+    frames[:5, :, :64] = studio.walk(5)
+    frames[5:, :, 160:224] = studio.walk(3)
+    frames[5:, :, :64] = studio.iuv(parts=(2, 23, 24))
+    planned = plan(studio, frames, cuts=(5,))
+    assert [(shot.start, shot.stop) for shot in planned.shots] == [(0, 5), (5, 8)]
+    left, right = (shot.window for shot in planned.shots)
+    assert left.x + left.side < right.x
+    assert all(frame.person.x0 >= 160 for frame in planned.frames[5:])
+    (whole,) = plan(studio, frames).shots
+    assert all(frame.person.x1 <= 64 for frame in plan(studio, frames).frames[:5])
+    assert (whole.start, whole.stop) == (0, 8)
+
+
+def test_cuts_outside_the_chosen_frames_do_not_count(studio) -> None:
+    planned = plan(studio, studio.walk(10), cuts=(0, 2, 5, 9), frames=(2, 9))
+    assert [(shot.start, shot.stop) for shot in planned.shots] == [(0, 3), (3, 7)]
+
+
+def test_a_shot_without_anybody_is_drawn_in_the_last_window(studio) -> None:
+    frames = studio.walk(6)
+    frames[2:4] = 0
+    first, second, third = plan(studio, frames, cuts=(2, 4)).shots
+    assert second.window == first.window
+    assert plan(studio, frames, cuts=(2, 4), missing="hold").frames[3].held == 1
+    assert third.start == 4
+
+
+def test_nobody_in_particular_is_whoever_is_there(studio) -> None:
+    """One person who jumps to where nobody was, and grows, is still the one."""
+    frames = np.zeros((2, 300, 300, 3), np.uint8)
+    frames[0, :96, :64] = studio.iuv()
+    frames[1, :, 100:300] = studio.iuv(scale=3, size=(300, 200))
+    assert plan(studio, frames).frames[1].person is None
+    assert plan(studio, frames, person=None).frames[1].person.x0 >= 100
+
+
+def test_chunks_are_divided_at_cuts(studio) -> None:
+    planned = plan(studio, studio.walk(CHUNK_FRAMES + 10), cuts=(7, CHUNK_FRAMES + 3))
+    pieces = [[(s.start, s.stop) for s in planned.shots_in(chunk)] for chunk in planned.chunks]
+    second = CHUNK_FRAMES
+    assert pieces == [[(0, 7), (7, second)], [(second, second + 3), (second + 3, second + 10)]]

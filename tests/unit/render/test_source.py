@@ -103,7 +103,7 @@ def test_a_named_iuv_is_taken(studio) -> None:
     photo = studio.source()
     other = (studio.folder / "person_IUV.png").rename(studio.folder / "other.png")
     assert prepare(photo, source_iuv=other).iuv_path == other
-    with pytest.raises(InputError, match=r"neither person_IUV\.png nor person_iuv\.png"):
+    with pytest.raises(InputError, match=r"neither person_IUV\.png nor person_iuv\.png is beside"):
         prepare(photo)
 
 

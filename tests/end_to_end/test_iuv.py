@@ -1,0 +1,141 @@
+"""`mt iuv` on raw pictures: what it writes and what it refuses."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from estimate_stubs import RED, scene, write_red_model
+from PIL import Image
+from skimage import data
+
+from motion_transfer.estimate.interface import Box
+from motion_transfer.media.iuv_stream import open_reader, open_stream
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+
+SIZE = (96, 64)
+
+
+@pytest.fixture(scope="module")
+def red_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_red_model(tmp_path_factory.mktemp("model") / "red.pt")
+
+
+@pytest.fixture
+def red(red_model: Path) -> list:
+    """The words that choose an estimator that takes red rectangles for people."""
+    return ["--estimator", "densepose", "--model", red_model]
+
+
+def somebody(x: int = 0) -> np.ndarray:
+    return scene((RED, Box(10 + x, 12, 40 + x, 84)), size=SIZE)
+
+
+def film(path: Path, frames: list[np.ndarray], rate: Fraction = Fraction(25)) -> Path:
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=rate)
+        stream.height, stream.width = frames[0].shape[:2]
+        stream.pix_fmt = "yuv420p"
+        for frame in frames:
+            picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))
+    return path
+
+
+def frames_of(path: Path) -> list[np.ndarray]:
+    reader = open_reader(open_stream(path))
+    return list(reader.read(0, reader.stream.frame_count))
+
+
+def test_a_photo(tmp_path: Path, mt, red) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    photo = tmp_path / "me.png"
+    Image.fromarray(np.rot90(somebody())).save(photo, exif=exif)
+    outcome = mt("iuv", photo, "-o", tmp_path / "me_IUV.png", *red)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "me_IUV.png: 1 frames" in outcome.out
+    (iuv,) = frames_of(tmp_path / "me_IUV.png")
+    assert iuv.shape == (*SIZE, 3)
+    assert set(np.unique(iuv[12:84, 10:40, 0])) == {2, 10}
+    assert not iuv[:10].any() and not iuv[:, 44:].any()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["me.png", "me_IUV.png"]
+
+
+@pytest.mark.parametrize("output", ["iuv", "iuv.mkv", "iuv.npy"])
+def test_a_video_with_gaps(tmp_path: Path, mt, red, output: str) -> None:
+    frames = [somebody(i) for i in range(12)]
+    frames[4] = frames[5] = scene(size=SIZE)
+    video = film(tmp_path / "dance.mp4", frames, Fraction(30000, 1001))
+    outcome = mt("iuv", video, "-o", tmp_path / output, *red)
+    assert outcome.code == 0
+    assert "nobody found in 2 frames, background only: 0:00.13-0:00.20 (frames 4:6)" in outcome.err
+    found = frames_of(tmp_path / output)
+    assert len(found) == 12
+    for index, iuv in enumerate(found):
+        columns = np.flatnonzero(iuv[..., 0].any(0))
+        assert len(columns) == 0 if index in (4, 5) else abs(columns[0] - 10 - index) <= 2
+    if output.endswith(".mkv"):
+        assert open_stream(tmp_path / output).frame_rate == Fraction(30000, 1001)
+
+
+def test_half_written_output_is_never_left(tmp_path: Path, mt, red) -> None:
+    frames = [somebody(), scene(size=SIZE), somebody()]
+    video = film(tmp_path / "dance.mp4", frames)
+    outcome = mt("iuv", video, "-o", tmp_path / "iuv", *red, "--missing", "fail")
+    assert outcome.code == 2
+    assert "frame 1 of" in outcome.err and "--missing hold" in outcome.err
+    assert [p.name for p in tmp_path.iterdir()] == ["dance.mp4"]
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--estimator", "magic"], "estimator 'magic'; supported are blazepose, densepose"),
+        (["--estimator", "densepose"], "needs its model"),
+        (["--model", "a.pt"], "leave it out, or choose the densepose"),
+        (["--person", "somebody"], "write largest, an index"),
+        (["--missing", "what"], "missing 'what'; supported are hold, background, fail"),
+    ],
+)
+def test_impossible_options(tmp_path: Path, mt, words: list[str], reason: str) -> None:
+    Image.fromarray(somebody()).save(tmp_path / "me.png")
+    outcome = mt("iuv", tmp_path / "me.png", "-o", tmp_path / "iuv.png", *words)
+    assert outcome.code == 2
+    assert reason in outcome.err
+
+
+def test_models_that_are_not_there_are_fetched_by_a_command(
+    tmp_path: Path, mt, monkeypatch
+) -> None:
+    pytest.importorskip("ai_edge_litert")
+    monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "cache"))
+    Image.fromarray(somebody()).save(tmp_path / "me.png")
+    outcome = mt("iuv", tmp_path / "me.png", "-o", tmp_path / "iuv.png")
+    assert outcome.code == 2
+    assert "`mt models fetch` fetches it" in outcome.err
+    assert not (tmp_path / "iuv.png").exists()
+
+
+@pytest.mark.parametrize("name", ["black", "pixel", "landscape"])
+def test_pictures_of_nobody(tmp_path: Path, mt, red, name: str) -> None:
+    picture = {
+        "black": np.zeros((48, 64, 3), np.uint8),
+        "pixel": np.full((1, 1, 3), 9, np.uint8),
+        "landscape": data.rocket(),
+    }[name]
+    Image.fromarray(picture).save(tmp_path / "a.png")
+    outcome = mt("iuv", tmp_path / "a.png", "-o", tmp_path / "b.png", *red)
+    assert outcome.code == 2
+    assert "nobody was found in" in outcome.err and "a.png" in outcome.err
+    assert not (tmp_path / "b.png").exists()
+
+
+def test_help_shows_both_ways(mt) -> None:
+    assert "estimate" in mt("iuv", "--help").out
+    assert "PHOTO|VIDEO|DIR" in mt("iuv", "estimate", "--help").out

@@ -1,0 +1,89 @@
+"""Estimators that see coloured rectangles, instead of ones that see people."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from motion_transfer.estimate.interface import Box, PersonEstimate
+
+RED, GREEN, BLUE = (250, 0, 0), (0, 250, 0), (0, 0, 250)
+COLOURS = (RED, GREEN, BLUE)
+
+
+def scene(*boxes: tuple[tuple[int, int, int], Box], size=(60, 80), ground=90) -> np.ndarray:
+    """A grey picture with rectangles, the later ones in front."""
+    picture = np.full((*size, 3), ground, np.uint8)
+    for colour, box in boxes:
+        picture[box.slices] = colour
+    return picture
+
+
+class RectangleEstimator:
+    """A rectangle of a pure colour is somebody: part 2, U and V from place in the box.
+
+    Each colour is a track; what covers a rectangle is cut out of its alpha, but not of its IUV.
+    """
+
+    def __init__(self) -> None:
+        self.shots = 0
+        self.frames = 0
+
+    def start_shot(self) -> None:
+        self.shots += 1
+
+    def estimate(self, frame: np.ndarray) -> list[PersonEstimate]:
+        self.frames += 1
+        people = []
+        for track, colour in enumerate(COLOURS):
+            mine = (np.abs(frame.astype(int) - colour) < 60).all(-1)
+            rows, columns = np.flatnonzero(mine.any(1)), np.flatnonzero(mine.any(0))
+            if not len(rows):
+                continue
+            box = Box(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+            iuv = np.zeros((box.height, box.width, 3), np.uint8)
+            iuv[..., 0] = 2 + track
+            iuv[..., 1] = np.linspace(30, 255, box.width)
+            iuv[..., 2] = np.linspace(30, 255, box.height)[:, None]
+            alpha = np.where(mine[box.slices], 255, 20).astype(np.uint8)
+            people.append(PersonEstimate(track, box, iuv, alpha, 0.9, None))
+        return people
+
+
+class RedModel(nn.Module):
+    """DensePose's interface: a red rectangle is one person, front torso above, left thigh below."""
+
+    def forward(self, image: Tensor) -> dict[str, Tensor]:
+        picture = image.int()  # blue, green, red
+        mine = (picture[:, :, 2] > 170) & (picture[:, :, 0] < 90) & (picture[:, :, 1] < 90)
+        rows, columns = torch.where(mine.any(1))[0], torch.where(mine.any(0))[0]
+        count = 1 if len(rows) > 0 else 0
+        box = torch.zeros(count, 4)
+        if count > 0:
+            corners = [columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]
+            box = torch.stack(corners)[None].float()
+        fine, coarse = torch.zeros(count, 25, 32, 32), torch.zeros(count, 2, 32, 32)
+        coarse[:, 1] = 9.0
+        fine[:, 2, :16], fine[:, 10, 16:] = 9.0, 9.0
+        ramp = torch.linspace(0.0, 1.0, 32)
+        u = ramp[None, None, None, :].expand(count, 25, 32, 32)
+        v = ramp[None, None, :, None].expand(count, 25, 32, 32)
+        return {
+            "pred_boxes": box,
+            "scores": torch.ones(count),
+            "pred_densepose_coarse_segm": coarse,
+            "pred_densepose_fine_segm": fine,
+            "pred_densepose_u": u,
+            "pred_densepose_v": v,
+        }
+
+
+def write_red_model(path: Path) -> Path:
+    """The model as a TorchScript file."""
+    with warnings.catch_warnings(action="ignore"):
+        torch.jit.script(RedModel()).save(str(path))
+    return path
