@@ -33,8 +33,8 @@ def red_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def red(red_model: Path) -> dict:
-    """The options that choose an estimator that takes red rectangles for people."""
-    return {"estimator": "densepose", "estimator_model": red_model}
+    """The options of a draft, and of an estimator that takes red rectangles for people."""
+    return {"estimator": "densepose", "estimator_model": red_model, "renderer": "texture"}
 
 
 def ground(name: str) -> np.ndarray:
@@ -88,11 +88,11 @@ def decode(path: Path) -> list[np.ndarray]:
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
-def test_a_photo_and_a_video(tmp_path: Path, mt: Callable, red: dict, me: Path) -> None:
+def test_a_photo_and_a_video(tmp_path: Path, draft: Callable, red: dict, me: Path) -> None:
     clip = film(tmp_path / "dance.mp4", dance(), sound=True)
     output = tmp_path / "out.mp4"
     words = ["--estimator", "densepose", "--estimator-model", red["estimator_model"]]
-    outcome = mt("run", "--source", me, "--driver", clip, "-o", output, *words)
+    outcome = draft("--source", me, "--driver", clip, "-o", output, *words)
     assert (outcome.code, outcome.err) == (0, "")
     with av.open(str(output)) as container:
         assert container.streams.video[0].average_rate == RATE
@@ -219,12 +219,12 @@ def test_a_photo_that_drives_itself_stays_as_it_is(tmp_path: Path, red: dict, me
     assert np.abs(before - after).mean() < 3
 
 
-def test_a_photo_of_nobody(tmp_path: Path, mt: Callable, red: dict) -> None:
+def test_a_photo_of_nobody(tmp_path: Path, draft: Callable, red: dict) -> None:
     nobody = tmp_path / "nobody.png"
     Image.fromarray(ground("rocket")).save(nobody)
     clip = film(tmp_path / "dance.mp4", dance(2))
     words = ["--estimator", "densepose", "--estimator-model", red["estimator_model"]]
-    outcome = mt("run", "--source", nobody, "--driver", clip, "-o", tmp_path / "a.mp4", *words)
+    outcome = draft("--source", nobody, "--driver", clip, "-o", tmp_path / "a.mp4", *words)
     assert outcome.code == 2
     assert "neither nobody_IUV.png nor nobody_iuv.png is beside it" in outcome.err
     assert "nobody was found in it" in outcome.err
@@ -232,17 +232,17 @@ def test_a_photo_of_nobody(tmp_path: Path, mt: Callable, red: dict) -> None:
 
 
 def test_models_that_are_not_there_are_fetched_by_a_command(
-    tmp_path: Path, mt: Callable, monkeypatch, studio
+    tmp_path: Path, draft: Callable, monkeypatch, studio
 ) -> None:
     pytest.importorskip("ai_edge_litert")
     monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "cache"))
     photo = tmp_path / "alone.png"
     Image.fromarray(ground("coffee")).save(photo)
-    outcome = mt("run", "--source", photo, "--driver", studio.driver(2), "-o", tmp_path / "a.mp4")
+    outcome = draft("--source", photo, "--driver", studio.driver(2), "-o", tmp_path / "a.mp4")
     assert outcome.code == 2
     assert "no IUV found for" in outcome.err and "`mt models fetch` fetches it" in outcome.err
     clip = film(tmp_path / "dance.mp4", dance(2))
-    outcome = mt("run", "--source", studio.source(), "--driver", clip, "-o", tmp_path / "a.mp4")
+    outcome = draft("--source", studio.source(), "--driver", clip, "-o", tmp_path / "a.mp4")
     assert outcome.code == 2
     assert "`mt models fetch` fetches it" in outcome.err
 
@@ -252,8 +252,7 @@ def test_a_batch_of_pictures(tmp_path: Path, mt: Callable, red: dict, me: Path) 
     manifest = tmp_path / "shoot.yaml"
     manifest.write_text(
         "version: 1\n"
-        f"defaults: {{estimator: densepose, estimator_model: {red['estimator_model']}}}\n"
-        "jobs:\n"
+        "defaults:\n" + "".join(f"  {name}: {value}\n" for name, value in red.items()) + "jobs:\n"
         "  - {source: me.png, driver: dance.mp4, output: a}\n"
         "  - {source: me.png, driver: dance.mp4, output: b, background: black}\n"
     )
