@@ -84,6 +84,8 @@ class IuvGroup(click.Group):
 def iuv() -> None:
     """IUV from raw pictures; convert IUV between formats, and repair it.
 
+    Without a command it is `estimate`, whose options `mt iuv estimate -h` lists.
+
     \b
     mt iuv me.jpg -o me_IUV.png
     mt iuv dance.mp4 -o dance.mkv

@@ -55,6 +55,7 @@ def cli() -> None:
     \b
     mt demo
     mt run --source photo.png --driver iuv_frames/ -o out.mp4
+    mt run --source me.jpg --driver dance.mp4 -o out.mp4
     """
 
 

@@ -33,11 +33,12 @@ def run(
 ) -> None:
     """Render the person of a photo in the motion of a driver.
 
-    A run that was stopped, in whatever way, goes on where it was when it is started again.
+    The IUV of a photo or a video that comes without it is estimated. A run that was stopped, in
+    whatever way, goes on where it was when it is started again.
 
     \b
     mt run --source photo.png --driver iuv_frames/ -o out.mp4
-    mt run --source photo.png --driver dance.mkv --background photo --compare -o out.mp4
+    mt run --source photo.png --driver dance.mp4 --background photo --compare -o out.mp4
     mt run --source me.png --driver me_IUV.png --garment dress.png \\
            --garment-parts torso,upper-legs --background photo -o dressed.png
     """

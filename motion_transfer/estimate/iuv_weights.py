@@ -57,7 +57,8 @@ def load_shipped() -> IuvNetwork:
     resource = files("motion_transfer.estimate").joinpath(SHIPPED)
     if not resource.is_file():
         raise WeightsError(
-            f"this installation lacks {SHIPPED}; install it anew, or give weights of your own"
+            f"this installation lacks {SHIPPED}, the weights with which the blazepose estimator"
+            " paints IUV; choose the densepose estimator with a model of yours, or give IUV"
         )
     with as_file(resource) as path:
         return load_weights(path)

@@ -10,7 +10,6 @@ from pathlib import Path
 import av
 import numpy as np
 from av.error import FFmpegError
-from av.sidedata.sidedata import Type
 from jaxtyping import Int32
 
 from motion_transfer.errors import InputError
@@ -176,5 +175,5 @@ def turn_upright(picture: Frame, matrix: Int32[np.ndarray, "3 3"] | None) -> Fra
 
 def _display_matrix(frame: av.VideoFrame) -> Int32[np.ndarray, "3 3"] | None:
     """How the file asks to be shown, if it does."""
-    data = frame.side_data.get(Type.DISPLAYMATRIX)
+    data = frame.side_data.get("DISPLAYMATRIX")
     return None if data is None else np.frombuffer(bytes(data), np.int32).reshape(3, 3)
