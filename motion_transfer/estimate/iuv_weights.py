@@ -52,10 +52,15 @@ def load_weights(path: Path) -> IuvNetwork:
     return network.fused().requires_grad_(False)
 
 
+def has_shipped() -> bool:
+    """Whether weights came with the package."""
+    return files("motion_transfer.estimate").joinpath(SHIPPED).is_file()
+
+
 def load_shipped() -> IuvNetwork:
     """The weights that come with the package. Raises: WeightsError."""
     resource = files("motion_transfer.estimate").joinpath(SHIPPED)
-    if not resource.is_file():
+    if not has_shipped():
         raise WeightsError(
             f"this installation lacks {SHIPPED}, the weights with which the blazepose estimator"
             " paints IUV; choose the densepose estimator with a model of yours, or give IUV"

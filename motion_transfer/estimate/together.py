@@ -31,12 +31,13 @@ def lay_together(
     for number, person in enumerate(people):
         place = person.box.slices
         wins = (person.iuv[..., 0] > 0) & (person.alpha > claim[place])
-        iuv[place][wins] = person.iuv[wins]
-        claim[place][wins] = person.alpha[wins]
-        owner[place][wins] = number
+        # not by `[wins]`: of a large photo its list of indices takes more memory than the photo
+        np.copyto(iuv[place], person.iuv, where=wins[..., None])
+        np.copyto(claim[place], person.alpha, where=wins)
+        np.copyto(owner[place], number, where=wins)
     if any(_touch(a.box, b.box) for a, b in combinations(people, 2)):
         nearby = cv2.erode(owner, np.ones((3, 3), np.uint8))  # the lowest number around
-        iuv[nearby < owner] = 0
+        iuv *= (nearby == owner)[..., None]
     return iuv
 
 

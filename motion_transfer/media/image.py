@@ -61,12 +61,14 @@ def read_photo(path: Path, what: str = "source") -> Photo:
             Image.open(io.BytesIO(data)) as file,
         ):
             turned = file.getexif().get(0x0112, 1) not in (0, 1)
-            image = ImageOps.exif_transpose(file)
+            # copies of large photos add up: only where something changes
+            image = ImageOps.exif_transpose(file) if turned else file
             if image.mode.startswith("I"):  # 16-bit grey; convert() would clip, not scale
                 grey = np.asarray(image).astype(np.uint32) >> 8
                 image = Image.fromarray(grey.astype(np.uint8))
             transparent = "A" in image.mode or "transparency" in image.info
-            pixels = np.array(image.convert("RGBA" if transparent else "RGB"))
+            mode = "RGBA" if transparent else "RGB"
+            pixels = np.array(image if image.mode == mode else image.convert(mode))
     except UnidentifiedImageError:
         raise InputError(f"{what} {path} is not a picture in a known format") from None
     except Image.DecompressionBombError as error:

@@ -17,6 +17,8 @@ from torch.utils.flop_counter import FlopCounterMode
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.extra import ESTIMATE_EXTRA
 from motion_transfer.estimate.extra import missing_packages as missing_for_pictures
+from motion_transfer.estimate.iuv_weights import SHIPPED as IUV_NETWORK
+from motion_transfer.estimate.iuv_weights import has_shipped
 from motion_transfer.estimate.model_files import MODEL_FILES, is_there, models_folder
 from motion_transfer.media.image import read_photo
 from motion_transfer.media.iuv_image import CHANNEL_ORDERS, IUV_SUFFIXES
@@ -74,6 +76,8 @@ def describe_setup() -> Facts:
 def _describe_estimators() -> str:
     if missing_for_pictures():
         return f"pip install '{ESTIMATE_EXTRA}'"
+    if not has_shipped():
+        return f"{IUV_NETWORK} is missing: only with a DensePose model of yours"
     absent = [file.name for file in MODEL_FILES if not is_there(file)]
     folder = models_folder()
     return (

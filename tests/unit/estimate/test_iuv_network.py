@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from motion_transfer.errors import WeightsError
+from motion_transfer.estimate import iuv_weights
 from motion_transfer.estimate.body_features import (
     BONES,
     GRID,
@@ -31,7 +32,7 @@ from motion_transfer.estimate.iuv_network import (
     spread_cells,
 )
 from motion_transfer.estimate.iuv_painting import FINEST, paint_iuv
-from motion_transfer.estimate.iuv_weights import load_weights, save_weights
+from motion_transfer.estimate.iuv_weights import load_shipped, load_weights, save_weights
 from nhrr_core import PART_NAMES
 
 SMALL = IuvNetworkConfig(widths=(8, 8, 12, 12), code=8)
@@ -221,3 +222,9 @@ def test_files_that_are_no_weights(tmp_path: Path, content: bytes | None) -> Non
         path.write_bytes(content)
     with pytest.raises(WeightsError, match="no weights of the IUV network"):
         load_weights(path)
+
+
+def test_without_its_weights_it_says_what_else_can_be_done(monkeypatch) -> None:
+    monkeypatch.setattr(iuv_weights, "SHIPPED", "lost.safetensors")
+    with pytest.raises(WeightsError, match=r"lacks lost.safetensors, .* densepose estimator"):
+        load_shipped()
