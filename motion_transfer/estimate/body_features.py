@@ -161,6 +161,7 @@ def _ends(points: Float[Tensor, "B 33 3"]) -> Float[Tensor, "B bones 2 3"]:
 
 
 @cache
+@torch.inference_mode(False)  # what is kept has to serve training, too
 def _membership() -> Float[Tensor, "bones 2 33"]:
     """Which landmarks a bone's two ends are the middle of."""
     shares = torch.zeros(len(BONES), 2, LANDMARK_COUNT)
@@ -172,6 +173,7 @@ def _membership() -> Float[Tensor, "bones 2 33"]:
 
 
 @cache
+@torch.inference_mode(False)
 def _grid() -> Float[Tensor, "cells 2"]:
     """x, y of the cells' centres, row by row."""
     centres = (torch.arange(GRID) + 0.5) / GRID

@@ -76,13 +76,13 @@ def describe_setup() -> Facts:
 def _describe_estimators() -> str:
     if missing_for_pictures():
         return f"pip install '{ESTIMATE_EXTRA}'"
-    if not has_shipped():
-        return f"{IUV_NETWORK} is missing: only with a DensePose model of yours"
-    absent = [file.name for file in MODEL_FILES if not is_there(file)]
     folder = models_folder()
-    return (
-        f"{' and '.join(absent)} not in {folder}: mt models fetch" if absent else f"ready, {folder}"
-    )
+    lacking = []
+    if absent := [file.name for file in MODEL_FILES if not is_there(file)]:
+        lacking.append(f"{' and '.join(absent)} not in {folder}: mt models fetch")
+    if not has_shipped():
+        lacking.append(f"{IUV_NETWORK} is missing: only with a DensePose model of yours")
+    return "; ".join(lacking) or f"ready, {folder}"
 
 
 def describe_preset(config: ModelConfig) -> Facts:

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from motion_transfer.errors import WeightsError
-from motion_transfer.estimate import iuv_weights
+from motion_transfer.estimate import body_features, iuv_weights
 from motion_transfer.estimate.body_features import (
     BONES,
     GRID,
@@ -129,6 +129,16 @@ def test_every_input_counts(body: BodyInput) -> None:
             torch.nn.init.normal_(block.film.weight, std=0.1)
     network(body).parts.square().sum().backward()
     assert all(value.grad is not None and value.grad.abs().sum() > 0 for value in inputs)
+
+
+def test_training_goes_on_after_estimating(body: BodyInput) -> None:
+    for kept in (body_features._grid, body_features._membership):
+        kept.cache_clear()
+    with torch.inference_mode():
+        feature_maps(body)
+    body.points.requires_grad_(True)
+    feature_maps(body).square().sum().backward()
+    assert body.points.grad is not None and body.points.grad.abs().sum() > 0
 
 
 def answer(parts: np.ndarray, uv: float = 0.5) -> IuvLogits:

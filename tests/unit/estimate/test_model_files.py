@@ -12,6 +12,7 @@ from motion_transfer.errors import FetchError, InputError, OutputError
 from motion_transfer.estimate import model_fetch, model_files
 from motion_transfer.estimate.model_fetch import fetch_models
 from motion_transfer.estimate.model_files import MODEL_FILES, digest, find_model, models_folder
+from motion_transfer.render import about
 
 CONTENTS = {file.name: file.name.encode() * 100 for file in MODEL_FILES}
 
@@ -134,3 +135,12 @@ def test_info_tells_whether_they_are_there(mt, monkeypatch, tmp_path: Path) -> N
     pytest.importorskip("ai_edge_litert")
     monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path))
     assert "mt models fetch" in mt("info").out
+
+
+def test_info_tells_that_the_iuv_network_is_missing(mt, monkeypatch) -> None:
+    pytest.importorskip("ai_edge_litert")
+    monkeypatch.setattr(about, "_describe_shipped", str)
+    monkeypatch.setattr(about, "has_shipped", lambda: False)
+    assert "iuv_network.safetensors is missing" in mt("info").out
+    monkeypatch.setattr(about, "has_shipped", lambda: True)
+    assert "is missing" not in mt("info").out
