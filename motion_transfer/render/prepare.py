@@ -88,6 +88,14 @@ class Prepared:
     chunk_keys: tuple[str, ...]
 
 
+def check_photos(options: RenderOptions) -> None:
+    """Raises: InputError if a photo is missing."""
+    photos = [("garment", garment.photo) for garment in options.garments]
+    for what, photo in [("source", options.source), *photos]:
+        if not photo.exists():
+            raise InputError(f"{what} {photo} does not exist")
+
+
 def scan_driver(options: RenderOptions, folder: Path, listener: Listener) -> DriverScan:
     """Decode a driver once; find its IUV first if it is raw pictures.
 

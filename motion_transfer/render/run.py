@@ -34,6 +34,7 @@ from motion_transfer.render.plan import Chunk, DriverPlan
 from motion_transfer.render.prepare import (
     Prepared,
     check_length,
+    check_photos,
     choose_run_recipe,
     plan_run,
     prepare_run,
@@ -128,6 +129,7 @@ def prepare(
 ) -> tuple[Prepared, Appearance]:
     """Everything that comes before the first frame. Raises: InputError and its kinds."""
     output_format = choose_format(options.output, codec=options.codec, crf=options.crf)
+    check_photos(options)  # now: to find a driver's people may take long
     scan = scan_driver(options, work.path, listener)
     if scan.pictures is not None:  # so that the folder stays if the run is stopped
         work.note(scan.pictures.iuv.name, scan.pictures.digest, scan.pictures.key)

@@ -73,9 +73,11 @@ def test_bad_input_is_one_line(mt, studio):
         ("run", "--source", "a.png", "--driver", "people:walk", "-o", "x.mp4"),
     ],
 )
-def test_without_the_extra_the_command_that_installs_it_is_said(mt, monkeypatch, arguments):
+def test_without_the_extra_the_command_that_installs_it_is_said(studio, mt, monkeypatch, arguments):
     from motion_transfer.people import extra
 
+    studio.source("a")
+    monkeypatch.chdir(studio.folder)
     monkeypatch.setattr(extra, "find_spec", lambda _name: None)
     outcome = mt(*arguments)
     assert outcome.code == 2

@@ -13,7 +13,8 @@ from estimate_stubs import RED, scene, write_red_model
 from PIL import Image
 from skimage import data
 
-from motion_transfer import render_video
+from motion_transfer import Garment, render_video
+from motion_transfer.errors import InputError
 from motion_transfer.estimate.interface import Box
 from motion_transfer.media.work import WorkFolder, work_path
 from motion_transfer.render.events import Notice, Stage
@@ -229,6 +230,20 @@ def test_a_photo_of_nobody(tmp_path: Path, draft: Callable, red: dict) -> None:
     assert "neither nobody_IUV.png nor nobody_iuv.png is beside it" in outcome.err
     assert "nobody was found in it" in outcome.err
     assert not (tmp_path / "a.mp4").exists()
+
+
+def test_a_missing_photo_is_told_before_the_driver_is_looked_at(
+    tmp_path: Path, red: dict, me: Path
+) -> None:
+    clip = film(tmp_path / "dance.mp4", dance(2))
+    events: list = []
+    dress = Garment(photo=tmp_path / "dress.png", parts=(2,))
+    for options in ({"source": tmp_path / "gone.png"}, {"source": me, "garments": (dress,)}):
+        with pytest.raises(InputError, match=r"(source|garment) .*(gone|dress).png does not exist"):
+            render_video(
+                driver=clip, output=tmp_path / "out", listener=events.append, **options, **red
+            )
+    assert events == []
 
 
 def test_models_that_are_not_there_are_fetched_by_a_command(
