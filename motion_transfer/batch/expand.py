@@ -255,6 +255,8 @@ def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
         paths = [("source", options.source), ("driver", options.driver)]
         if options.weights is not None:
             paths.append(("weights", find_weights(options.weights)))
+        if options.estimator_model is not None:
+            paths.append(("estimator model", options.estimator_model))
         paths += [("garment", garment.photo) for garment in options.garments]
         if options.audio is not None and str(options.audio) != NO_AUDIO:
             paths.append(("audio", options.audio))

@@ -231,6 +231,12 @@ def test_missing_inputs_are_named_once(tmp_path: Path) -> None:
     ]
 
 
+def test_a_missing_estimator_model_is_named(tmp_path: Path) -> None:
+    text = job_text(estimator="densepose", estimator_model="m.pt")
+    problems = list(check_inputs(jobs_of(write(tmp_path, text))))
+    assert problems[-1] == f"job 0 (a.mp4): estimator model {tmp_path}/m.pt does not exist"
+
+
 @pytest.mark.parametrize("name", ["demo.yaml", "matrix.yaml", "cluster.toml"])
 def test_the_manifests_of_the_project_are_valid(name: str, tmp_path: Path) -> None:
     manifest, text = read_manifest(JOBS / name)
