@@ -79,7 +79,11 @@ class LocalWorkers:
             initargs=(place, self.count, sys.path),
         )
         with _deaf():
-            return pool.submit(task, *arguments)
+            future = pool.submit(task, *arguments)
+        # the worker has its own; with this one open, half a result of a worker that was killed
+        # would be waited for without end
+        pool._result_queue._writer.close()
+        return future
 
     def share(self, name: str, blob: bytes) -> Fetch:
         path = self._scratch / name

@@ -10,6 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
+from processes import die_in_mid_result
 
 from motion_transfer.batch.run import heed_interrupts
 from motion_transfer.batch.workers import LocalWorkers
@@ -34,6 +35,16 @@ def test_workers_hear_no_ctrl_c_and_are_replaced(tmp_path: Path) -> None:
     assert time.monotonic() - began < 300
     assert multiprocessing.active_children() == []
     assert not (tmp_path / "scratch").exists()
+
+
+def test_half_a_result_is_not_waited_for(tmp_path: Path) -> None:
+    workers = LocalWorkers(1, tmp_path / "scratch")
+    try:
+        with pytest.raises(BrokenProcessPool):
+            workers.submit(0, die_in_mid_result).result(100)
+        assert workers.submit(0, abs, -1).result(100) == 1
+    finally:
+        workers.stop(now=True)
 
 
 class Halting:
