@@ -82,7 +82,7 @@ class LocalWorkers:
             future = pool.submit(task, *arguments)
         # the worker has its own; with this one open, half a result of a worker that was killed
         # would be waited for without end
-        pool._result_queue._writer.close()
+        pool._result_queue._writer.close()  # type: ignore[attr-defined]
         return future
 
     def share(self, name: str, blob: bytes) -> Fetch:
