@@ -16,13 +16,11 @@ from PIL import Image, ImageDraw, ImageFont
 from motion_transfer.media.image import read_photo
 from motion_transfer.media.iuv_stream import open_reader, open_stream
 from motion_transfer.people import PeopleStream
-from motion_transfer.render.completion import complete_texture
 from motion_transfer.render.compose import colour_iuv, paste
 from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.recipe import Recipe
 from motion_transfer.render.source import prepare_source
-from motion_transfer.render.texture_renderer import TextureRenderer, tabulate_texture
 from motion_transfer.render.window import Window
-from nhrr_core import load_uv_layout
 
 ROOT = Path(__file__).parents[1]
 DEMO = ROOT / "motion_transfer" / "demo"
@@ -36,14 +34,18 @@ def main() -> None:
     options = RenderOptions(
         source=DEMO / "source.png", driver=DEMO / "driver.mkv", output=Path("unused.mp4")
     )
-    source = prepare_source(options, 256)
+    recipe = Recipe(options.renderer, options.weights_file)
+    source = prepare_source(options, recipe.texture_size)
+    feature_map = recipe.appearance_of(source)
     reader = open_reader(open_stream(options.driver))
-    renderer = TextureRenderer(tabulate_texture(source))
+    renderer = recipe.renderer(feature_map)
     targets = [next(iter(reader.read(moment, moment + 1))) for moment in MOMENTS]
     results = []
     for iuv in targets:
         frame = np.full_like(iuv, 255)
-        paste(frame, renderer.render(iuv[None])[0], Window(0, 0, iuv.shape[0]))
+        window = Window(0, 0, iuv.shape[0])
+        crop = window.cut(iuv, renderer.working_size(window.side))
+        paste(frame, renderer.render(crop[None])[0], window)
         results.append(frame)
 
     cut = [np.s_[:, 35:285]] * len(targets)
@@ -62,7 +64,6 @@ def main() -> None:
 
     save(ROOT / "docs" / "people.jpg", people_sheet())
 
-    full = complete_texture(source.texture, source.visibility, load_uv_layout())
     partial = np.where(source.visibility[0, 0, ..., None] > 0, picture(source.texture), 255)
     save(
         ROOT / "docs" / "how_it_works.png",
@@ -71,7 +72,7 @@ def main() -> None:
                 panel(source.photo.rgb, "source photo"),
                 panel(colour_iuv(source.iuv), "its IUV"),
                 panel(partial.astype(np.uint8), "partial texture: what is seen"),
-                panel(picture(full), "completed, once per source"),
+                panel(picture(feature_map[:, :3]), "feature map (3 of 16), once"),
                 panel(colour_iuv(targets[1]), "target IUV, per frame"),
                 panel(results[1], "frame"),
             ]
@@ -92,7 +93,8 @@ def people_sheet() -> np.ndarray:
 
 def picture(texture) -> np.ndarray:
     """A texture in [-1, 1] as an RGB picture."""
-    return ((texture[0].permute(1, 2, 0).numpy() + 1) * 127.5).round().clip(0, 255).astype(np.uint8)
+    colours = np.moveaxis(np.asarray(texture[0]), 0, -1)
+    return ((colours + 1) * 127.5).round().clip(0, 255).astype(np.uint8)
 
 
 def panel(image: np.ndarray, label: str) -> np.ndarray:

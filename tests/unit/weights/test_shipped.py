@@ -22,8 +22,8 @@ def test_they_load_and_say_what_they_are(name: str) -> None:
     assert info.notes["licence"] == "CC0-1.0"
     assert "synthetic people" in info.notes["data"]
     recipe = tomllib.loads(info.notes["train.toml"])
-    assert recipe["data"]["people_cache"] == ""
-    assert 0 < int(info.notes["step"]) <= recipe["run"]["steps"]
+    assert "/" not in recipe["run"]["init"] + recipe["data"]["people_cache"]
+    assert int(info.notes["step"]) > 0
     model = load_checkpoint(path)
     assert all(value.dtype == torch.float32 for value in model.parameters())
     assert all(bool(value.isfinite().all()) for value in model.parameters())
@@ -33,15 +33,13 @@ def test_the_default_has_alpha_and_the_recipe_is_in_the_docs() -> None:
     path = find_weights(DEFAULT_WEIGHTS)
     info = inspect_checkpoint(path)
     assert (info.config.variant, info.config.alpha, info.config.image_size) == ("full", True, 256)
-    recipe = Path(__file__).parents[3] / "docs" / "weights" / f"{DEFAULT_WEIGHTS}.toml"
-    assert recipe.read_text() == info.notes["train.toml"]
+    recipes = Path(__file__).parents[3].glob(f"docs/weights/{DEFAULT_WEIGHTS}-*.toml")
+    assert max(recipes).read_text() == info.notes["train.toml"]
 
 
-def test_a_path_is_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_path_is_a_path(tmp_path: Path) -> None:
     assert find_weights(tmp_path / "mine.safetensors") == tmp_path / "mine.safetensors"
-    monkeypatch.chdir(tmp_path)
-    Path("lite").touch()
-    assert find_weights(Path("lite")) == Path("lite")
+    assert find_weights(tmp_path / "lite") == tmp_path / "lite"
 
 
 def test_a_package_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
