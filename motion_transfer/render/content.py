@@ -40,6 +40,12 @@ def digest_file(path: Path, what: str) -> str:
         raise InputError(f"{what} {path} cannot be read: {error.strerror}") from error
 
 
+def digest_weights(options: RenderOptions) -> str:
+    """SHA-256 of the checkpoint that draws; empty for a renderer without. Raises: InputError."""
+    weights = options.weights_file
+    return digest_file(weights, "weights") if weights else ""
+
+
 def source_key(options: RenderOptions, recipe: Recipe) -> str:
     """Of everything that decides a source's appearance. Raises: InputError for a missing file."""
     files = [("source", options.source, options.source_iuv)]

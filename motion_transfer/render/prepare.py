@@ -16,7 +16,7 @@ from motion_transfer.media.stream import IuvStream
 from motion_transfer.people.motion_name import is_motion
 from motion_transfer.render.canvas import Canvas
 from motion_transfer.render.compose import Comparison, make_background
-from motion_transfer.render.content import chunk_key, digest_file, run_key, source_key
+from motion_transfer.render.content import chunk_key, digest_weights, run_key, source_key
 from motion_transfer.render.events import FramesDone, Listener, Notice, Stage
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
 from motion_transfer.render.picture_driver import PictureDriver, estimate_driver
@@ -187,8 +187,7 @@ def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
 
 def choose_run_recipe(options: RenderOptions, plan: DriverPlan, listener: Listener) -> Recipe:
     """The renderer of a run. Raises: InputError, WeightsError."""
-    digest = digest_file(options.weights_file, "weights") if options.weights_file else ""
-    return choose_recipe(options, len(plan.frames), digest, listener)
+    return choose_recipe(options, len(plan.frames), digest_weights(options), listener)
 
 
 def prepare_run(
