@@ -110,6 +110,11 @@ def scan_driver(options: RenderOptions, folder: Path, listener: Listener) -> Dri
             listener(Notice(FIRST_USE))
     elif _are_pictures(options):
         return _scan_pictures(options, folder, listener)
+    if options.fit_body:
+        raise InputError(
+            f"--fit-body compares landmarks, and IUV as in the driver {options.driver} has none;"
+            " give the video or pictures that it was made from, or leave out --fit-body"
+        )
     missing = options.missing or "fail"
     stream = _open_stream(options.driver, missing)
     if stream.gaps:
