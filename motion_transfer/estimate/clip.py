@@ -90,11 +90,7 @@ def estimate_clip(
     with closing(read_ahead(frames, AHEAD_FRAMES)) as ahead:
         yield from fill_gaps(ahead, "hold") if missing == "hold" else ahead
     if summary.empty_count == summary.frame_count:
-        what = pictures.path if summary.frame_count == 1 else f"any frame of {pictures.path}"
-        raise InputError(
-            f"nobody was found in {what}; it should show a person, upright and larger than about"
-            " 60 pixels, whose IUV can otherwise be made by DensePose"
-        )
+        raise _nobody(pictures, summary.frame_count)
 
 
 def follow_landmarks(
@@ -111,7 +107,7 @@ def follow_landmarks(
     Args:
         person: as `estimate_clip`'s, but for `all`.
         done: called with 1 after each frame.
-    Raises: InputError for a frame that is broken, or a person that is not there.
+    Raises: InputError if nobody is found in any of them, or for a frame that is broken.
     """
     found: list[Landmarks] = []
     with closing(_follow(pictures, estimator, person, chosen)) as frames:
@@ -121,7 +117,17 @@ def follow_landmarks(
                 done(1)
             if len(found) == count:
                 break
+    if not found:
+        raise _nobody(pictures, len(chosen))
     return found
+
+
+def _nobody(pictures: PictureStream, frame_count: int) -> InputError:
+    what = pictures.path if frame_count == 1 else f"any frame of {pictures.path}"
+    return InputError(
+        f"nobody was found in {what}; it should show a person, upright and larger than about"
+        " 60 pixels, whose IUV can otherwise be made by DensePose"
+    )
 
 
 @dataclass(frozen=True)

@@ -133,10 +133,13 @@ def test_a_driver_without_landmarks_is_refused(
     assert not output.exists()
 
 
-def test_a_source_of_nobody_is_named(tmp_path: Path, dance: Path) -> None:
+def test_pictures_of_nobody_are_named(tmp_path: Path, dance: Path) -> None:
     nobody = save(tmp_path / "nobody.png")
     with pytest.raises(InputError, match=r"no landmarks .* in the source .*nobody.png"):
         render_video(nobody, dance, tmp_path / "out", renderer="texture", fit_body=True)
+    with pytest.raises(InputError, match=r"nobody was found in .*nobody.png; it should show"):
+        photo = save(tmp_path / "me.png", somebody(SOURCE_HIPS))
+        render_video(photo, nobody, tmp_path / "out", renderer="texture", fit_body=True)
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")

@@ -191,6 +191,20 @@ def test_left_stays_left(scales: dict[str, float]) -> None:
     assert np.abs(moved[LANDMARK["right-wrist"]]).max() < 1e-6
 
 
+def test_small_moves_stay_small() -> None:
+    """Also where the lowest foot is first one, then the other; and jumps stay as high."""
+    fit = BodyFit(WHOLE | {"thigh": 1.2, "shin": 0.8, "trunk": 0.9})
+    before, after = person(), person()
+    for landmarks, side in ((before, "left"), (after, "right")):
+        rows = [LANDMARK[f"{side}-heel"], LANDMARK[f"{side}-foot-index"]]
+        landmarks.image[rows, 1] += 0.01
+    moved = fit_landmarks(after, fit).image - fit_landmarks(before, fit).image
+    assert np.abs(moved).max() < 0.05
+    jumping = replace(before, image=before.image - np.array([0, 40, 0], np.float32))
+    moved = fit_landmarks(jumping, fit).image - fit_landmarks(before, fit).image
+    assert moved == pytest.approx(np.tile([0, -40, 0], (LANDMARK_COUNT, 1)), abs=1e-3)
+
+
 def test_bones_that_one_of_them_does_not_show_stay_the_drivers() -> None:
     source = person()
     legs = [LANDMARK[f"{s}-{j}"] for s in ("left", "right") for j in ("knee", "ankle")]
