@@ -65,9 +65,7 @@ def test_the_manifest_means_the_same(
 
 def test_paths_below_the_manifest_can_move_with_it(tmp_path: Path) -> None:
     text = manifest_text(
-        options(
-            source=tmp_path / "a.png", driver=Path("/elsewhere/d"), output=tmp_path / "o/b.mp4"
-        ),
+        options(source=tmp_path / "a.png", driver=Path("/else/d"), output=tmp_path / "o/b.mp4"),
         tmp_path / "job.yaml",
     )
     assert "source: a.png" in text
