@@ -11,8 +11,10 @@ endif
 
 .PHONY: demo test lint check schema lock clean
 
-demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion
+demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion, then one without IUV
 	$(BIN)/mt demo --output demo.mp4 --force
+	$(BIN)/mt models fetch
+	$(BIN)/mt demo --photo-alone --output astronaut.mp4 --force
 
 test: $(VENV)/.installed-dev  ## run the tests
 	$(BIN)/python -m pytest --numprocesses auto
@@ -44,10 +46,10 @@ $(VENV)/.installed-dev: requirements-dev.lock $(VENV)/.installed
 lock: $(VENV)/.installed-dev  ## pin anew what pyproject.toml asks for
 	$(BIN)/python -m pip install --quiet pip-tools
 	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
-		--output-file requirements.lock pyproject.toml
+		--extra estimate --extra preview --output-file requirements.lock pyproject.toml
 	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
 		--extra dev --extra people --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	sed -i 's/^torch==\([0-9.]*\)+cpu/torch==\1/' requirements.lock requirements-dev.lock
 
 clean:  ## remove what was set up and built
-	rm -rf $(VENV) build dist *.egg-info demo.mp4
+	rm -rf $(VENV) build dist *.egg-info demo.mp4 astronaut.mp4

@@ -1,4 +1,4 @@
-"""Make the demo's photo, its IUV and its driver anew: `python tools/build_demo.py`.
+"""Make the demo's photo, its IUV and its drivers anew: `python tools/build_demo.py`.
 
 They are a synthetic person and a motion of this project's own (`motion_transfer.people`), so that
 the same package versions on the same machine give the same files.
@@ -25,6 +25,14 @@ from motion_transfer.people.recording import record_motion
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"
 SEED, PERSON = 11, 8
 SOURCE_SIZE = (512, 768)
+WAVE = MotionOptions(
+    motion="wave",
+    frame_count=30,
+    frame_rate=Fraction(15),
+    size=(240, 240),
+    framing="upper",
+    shape=Shape(gender=1.0, height=0.5),
+)
 DRIVER = MotionOptions(
     motion="dance",
     frame_count=120,
@@ -51,6 +59,7 @@ def main() -> None:
     write_png(DEMO / "source.png", photo.rgb)
     write_png(DEMO / "source_IUV.png", photo.iuv[..., ::-1])
     record_motion(DRIVER, DEMO / "driver.mkv", force=True)
+    record_motion(WAVE, DEMO / "wave.mkv", force=True)
 
 
 if __name__ == "__main__":
