@@ -20,7 +20,7 @@ from motion_transfer.weights.checkpoint import (
     load_checkpoint,
     save_checkpoint,
 )
-from nhrr_core import VARIANTS, ModelConfig, NeuralReRenderer
+from nhrr_core import VARIANTS, NeuralReRenderer
 
 SIDE = 128
 SETTINGS = {
@@ -71,11 +71,10 @@ def train(run: Path, variant: str, people: Path, steps: int) -> None:
 
 def halve(trained: Path, output: Path) -> None:
     """The same weights, for the size that they were trained at."""
-    config = inspect_checkpoint(trained).config
-    halved: ModelConfig = replace(config, image_size=SIDE, texture_size=SIDE)
-    model = NeuralReRenderer(halved)
+    info = inspect_checkpoint(trained)
+    model = NeuralReRenderer(replace(info.config, image_size=SIDE, texture_size=SIDE))
     model.load_state_dict(load_checkpoint(trained).state_dict())
-    save_checkpoint(output, model, notes=inspect_checkpoint(trained).notes)
+    save_checkpoint(output, model, notes=info.notes)
 
 
 def call(*words: object) -> None:

@@ -20,6 +20,7 @@ from statistics import mean
 from motion_transfer.cli.main import main as mt
 from motion_transfer.media.image import read_photo
 from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.render.beside import find_iuv_beside
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.run import run
 from motion_transfer.training.metrics import flicker
@@ -40,9 +41,7 @@ def main() -> None:
 
 def list_photos(folder: Path) -> list[Path]:
     """Those with an IUV beside them."""
-    return sorted(
-        path for path in folder.glob("*.png") if path.with_stem(f"{path.stem}_iuv").exists()
-    )
+    return [path for path in sorted(folder.glob("*.png")) if find_iuv_beside(path)]
 
 
 def compare_photos(fashion: Path, weights: Path, folder: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
@@ -52,23 +51,20 @@ def render_video(
     Raises: MotionTransferError (`InputError` for input that cannot be used), saying what is wrong,
         where, and what to do. Nothing half-written is left behind.
     """
-    base = RenderOptions(
-        source=Path(source),
-        driver=Path(driver),
-        output=Path(output),
-        weights=_path(weights),
-        estimator_model=_path(estimator_model),
-        **options,
-    )
     return run(
-        replace(
-            base,
+        RenderOptions(
+            source=Path(source),
+            driver=Path(driver),
+            output=Path(output),
             source_iuv=_path(source_iuv),
+            weights=_path(weights),
+            estimator_model=_path(estimator_model),
             sheet=_path(sheet),
             audio=_path(audio),
             frames=parse_frames(frames) if isinstance(frames, str) else frames or (None, None),
             frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
             garments=tuple(garments),
+            **options,
         ),
         listener,
     )

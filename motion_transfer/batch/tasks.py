@@ -109,13 +109,12 @@ def scan(options: RenderOptions, folder: Path) -> tuple[bytes, Files, list[str]]
 
 def look(options: RenderOptions) -> tuple[bytes, bytes, Files]:
     """A source, its appearance (the feature map), its files. Raises: InputError, WeightsError."""
-    from motion_transfer.render.content import digest_file
+    from motion_transfer.render.content import digest_weights
     from motion_transfer.render.recipe import Recipe
     from motion_transfer.render.source import prepare_source
 
     files = sign_files(source_files(options))
-    digest = digest_file(options.weights_file, "weights") if options.weights_file else ""
-    recipe = Recipe(options.renderer, options.weights_file, digest)
+    recipe = Recipe(options.renderer, options.weights_file, digest_weights(options))
     source = prepare_source(options, recipe.texture_size)
     return pickle.dumps(source, 5), pickle.dumps(recipe.appearance_of(source), 5), files
 

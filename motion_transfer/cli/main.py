@@ -15,6 +15,7 @@ from motion_transfer.version import __version__
 
 COMMANDS = {
     "run": "Render the person of a photo in the motion of a driver.",
+    "preview": "See a run frame by frame in the browser, before it is rendered.",
     "batch": "Render a manifest of many jobs: validate, run, status, report, clean.",
     "demo": "Render a photo and a driver that ship with the program.",
     "train": "Train the network, or fine-tune it on one person.",

@@ -61,15 +61,24 @@ class WordsCommand(SectionCommand):
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """A decorator: every option of a run, as `RenderOptions` describes it."""
+    return _with_run_options(command, required=True)
+
+
+def loose_run_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """As `run_options`, but none has to be given: a manifest may say it."""
+    return _with_run_options(command, required=False)
+
+
+def _with_run_options(command: Callable[..., Any], *, required: bool) -> Callable[..., Any]:
     from motion_transfer.render.options import RenderOptions
 
     for entry in reversed(list_options(RenderOptions)):
-        for decorate in reversed(_decorators(entry)):
+        for decorate in reversed(_decorators(entry, required=required and entry.required)):
             command = decorate(command)
     return command
 
 
-def _decorators(entry: Option) -> list[Callable[..., Any]]:
+def _decorators(entry: Option, *, required: bool) -> list[Callable[..., Any]]:
     common: dict[str, Any] = {"cls": SectionOption, "section": entry.section, "help": entry.help}
     if entry.kind == "garments":
         photo, parts = entry.flags
@@ -91,7 +100,7 @@ def _decorators(entry: Option) -> list[Callable[..., Any]]:
         common["default"] = None
     else:
         common |= {"type": int if entry.kind == "integer" else str, "metavar": entry.metavar}
-        common["required"] = entry.required
+        common["required"] = required
         if entry.kind == "text":
             common["default"] = entry.default
     return [click.option(*entry.flags, entry.name, **common)]

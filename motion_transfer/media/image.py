@@ -85,3 +85,19 @@ def write_png(path: Path, pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray,
     if not ok:
         raise OSError(f"cannot encode a PNG of {pixels.shape}")
     path.write_bytes(encoded.tobytes())
+
+
+def encode_png(pixels: UInt8[np.ndarray, "H W 3"], *, compression: int = 1) -> bytes:
+    """An RGB picture as PNG; `compression` from 0 (large, fast) to 9."""
+    _, encoded = cv2.imencode(".png", pixels[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, compression))
+    return encoded.tobytes()
+
+
+def encode_jpeg(pixels: UInt8[np.ndarray, "H W 3"], *, quality: int = 92) -> bytes:
+    """An RGB picture as JPEG with whole colour resolution; `quality` from 0 to 100."""
+    settings = (
+        *(cv2.IMWRITE_JPEG_QUALITY, quality),
+        *(cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444),
+    )
+    _, encoded = cv2.imencode(".jpg", pixels[..., ::-1], settings)
+    return encoded.tobytes()

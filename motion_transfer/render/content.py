@@ -22,7 +22,8 @@ from motion_transfer.version import __version__
 LIBRARIES = ("torch", "numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy")
 SAID_OTHERWISE = {
     *("source", "source_iuv", "garments", "weights"),  # by the files' content
-    *("driver", "driver_person", "iuv_order", "missing", "frames", "frame_rate"),  # by the plan
+    *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
+    *("frames", "frame_rate"),  # likewise
     *("driver_kind", "estimator", "estimator_model"),  # by the source and the plan
     *("renderer", "compile", "codec", "crf"),  # by the recipe and the format
     *("output", "force", "restart", "workers"),  # never change what is drawn
@@ -38,6 +39,12 @@ def digest_file(path: Path, what: str) -> str:
         raise InputError(f"{what} {path} does not exist") from None
     except OSError as error:
         raise InputError(f"{what} {path} cannot be read: {error.strerror}") from error
+
+
+def digest_weights(options: RenderOptions) -> str:
+    """SHA-256 of the checkpoint that draws; empty for a renderer without. Raises: InputError."""
+    weights = options.weights_file
+    return digest_file(weights, "weights") if weights else ""
 
 
 def source_key(options: RenderOptions, recipe: Recipe) -> str:

@@ -19,7 +19,6 @@ from motion_transfer.errors import InputError, RenderError
 from motion_transfer.media.segments import open_segment
 from motion_transfer.render.canvas import Image
 from motion_transfer.render.events import FramesDone, Listener, ignore
-from motion_transfer.render.person import isolate
 from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
 from motion_transfer.render.prepare import Prepared
 from motion_transfer.render.renderer import Renderer
@@ -151,9 +150,4 @@ class Engine:
                     f"{self._reader.stream.where(shown_index)} has changed since the run began;"
                     " start again when it is complete"
                 )
-            if plan.alone:
-                yield shown
-            elif plan.person is None:
-                yield np.zeros_like(shown)
-            else:
-                yield isolate(shown, plan.person)
+            yield plan.isolate(shown)

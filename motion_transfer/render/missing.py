@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from motion_transfer.render.person import Person
+import numpy as np
+from jaxtyping import UInt8
+
+from motion_transfer.render.person import Person, isolate
 
 LISTED_STRETCHES = 10
 
@@ -24,6 +27,12 @@ class FramePlan:
     alone: bool
     digest: str = ""
     held: int | None = None
+
+    def isolate(self, iuv: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
+        """The IUV of the frame that is shown, with nobody but the person in it."""
+        if self.alone:
+            return iuv
+        return np.zeros_like(iuv) if self.person is None else isolate(iuv, self.person)
 
 
 def hold_frames(frames: Sequence[FramePlan], first: int) -> tuple[FramePlan, ...]:

@@ -8,7 +8,7 @@ from copy import deepcopy
 import cv2
 import numpy as np
 import torch
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from motion_transfer.render.person import disc, occupancy
@@ -46,6 +46,11 @@ class PreparedNetwork:
             frame = self._model.blend(self._draw(features), features)
             return ((frame + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
 
+    def feature_image(self, feature_map: Tensor, target: Tensor) -> Tensor:
+        """What RenderNet sees: B x D x S x S float32, on the CPU, of B x 3 x S x S target IUV."""
+        with torch.inference_mode():
+            return self._model.feature_image(feature_map, target.to(self.device)).float().cpu()
+
     def _prepare_net(self, net: RenderNet, *, compile: bool) -> Callable[[Tensor], Tensor]:
         """Float32 features to a float32 frame, in the form that runs fastest here."""
         if compile and self.device.type == "cpu":
@@ -77,6 +82,11 @@ class NeuralRenderer:
 
     def working_size(self, window_side: int) -> int:
         return self._network.config.image_size
+
+    def feature_image(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> Float[np.ndarray, "B D S S"]:
+        """The feature map as the target's pixels see it."""
+        target = torch.from_numpy(iuv).permute(0, 3, 1, 2)
+        return self._network.feature_image(self._feature_map, target).numpy()
 
     def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:
         target = torch.from_numpy(iuv).permute(0, 3, 1, 2)

@@ -25,6 +25,7 @@ ESTIMATORS = ("blazepose", "densepose")
 DRIVER_KINDS = ("iuv", "pictures")
 NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
+SMALLEST_WINDOW, LARGEST_WINDOW = 16, 16384
 DEFAULT_RATE = Fraction(30)
 LONGEST_RATE_TERM = 2**31 - 1  # what FFmpeg's fractions hold
 RATE_DENOMINATOR = 100_000
@@ -110,6 +111,14 @@ class RenderOptions:
         "Frames that show nobody, and numbers missing in a folder: hold (repeat the frame before),"
         " background, or fail. Default: background for the former, fail for the latter.",
         choices=MISSING,
+    )
+    window: str = option(
+        "--window",
+        "Driver",
+        "auto (default: around the person, in every frame), or the square X,Y,SIDE of the driver's"
+        " frame, px, that is drawn.",
+        default="auto",
+        metavar="X,Y,SIDE",
     )
     frames: tuple[int | None, int | None] = option(
         "--frames",
@@ -246,6 +255,7 @@ class RenderOptions:
         if self.workers is not None and self.workers < 1:
             raise InputError(f"workers is {self.workers}; it must be at least 1")
         parse_colour(self.background)
+        parse_window(self.window)
 
     @property
     def weights_file(self) -> Path | None:
@@ -274,6 +284,21 @@ def parse_colour(background: str) -> tuple[int, int, int] | None:
             f"background {background!r}; supported are white, black, photo and #rrggbb"
         ) from None
     return red, green, blue
+
+
+def parse_window(text: str) -> tuple[int, int, int] | None:
+    """x, y and side, px, of `X,Y,SIDE`; None for `auto`. Raises: InputError."""
+    if text == "auto":
+        return None
+    try:
+        x, y, side = (int(word) for word in text.split(","))
+    except ValueError:
+        raise InputError(f"window {text!r}; write X,Y,SIDE in pixels, or auto") from None
+    if not SMALLEST_WINDOW <= side <= LARGEST_WINDOW:
+        raise InputError(
+            f"window {text!r}; its side lies between {SMALLEST_WINDOW} and {LARGEST_WINDOW} pixels"
+        )
+    return x, y, side
 
 
 def parse_frames(text: str) -> tuple[int | None, int | None]:

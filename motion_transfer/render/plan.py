@@ -174,6 +174,7 @@ def plan_path(
     where_found: str,
     missing: Missing | None = None,
     cuts: Sequence[int] = (),
+    window: Window | None = None,
 ) -> DriverPlan:
     """Follow the chosen person through the driver and lay a window around the path in each shot.
 
@@ -187,6 +188,7 @@ def plan_path(
             `background`, but somebody has to be in the first frame.
         cuts: the driver's frames with which shots begin, in order. In a later shot the person is
             chosen anew; whom the choice does not find there, the largest replaces.
+        window: of every shot; None: one around the path in each.
     Raises: InputError if nobody is in any frame, or in one where `missing` asks for somebody.
     """
     people = [frame.people for frame in seen]
@@ -220,7 +222,11 @@ def plan_path(
         )
     if missing == "hold":
         plans = hold_frames(plans, chosen.start)
-    return DriverPlan(chosen.start, plans, _lay_windows(plans, ranges), frame_rate)
+    if window is not None:
+        shots = tuple(Shot(start, stop, window) for start, stop in ranges)
+    else:
+        shots = _lay_windows(plans, ranges)
+    return DriverPlan(chosen.start, plans, shots, frame_rate)
 
 
 def _path_in_shot(

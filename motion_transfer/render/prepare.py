@@ -16,9 +16,9 @@ from motion_transfer.media.stream import IuvStream
 from motion_transfer.people.motion_name import is_motion
 from motion_transfer.render.canvas import Canvas
 from motion_transfer.render.compose import Comparison, make_background
-from motion_transfer.render.content import chunk_key, digest_file, run_key, source_key
+from motion_transfer.render.content import chunk_key, digest_weights, run_key, source_key
 from motion_transfer.render.events import FramesDone, Listener, Notice, Stage
-from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
+from motion_transfer.render.options import DEFAULT_RATE, RenderOptions, parse_window
 from motion_transfer.render.picture_driver import PictureDriver, estimate_driver
 from motion_transfer.render.plan import (
     DriverPlan,
@@ -29,6 +29,7 @@ from motion_transfer.render.plan import (
 )
 from motion_transfer.render.recipe import Recipe, choose_recipe
 from motion_transfer.render.source import Source
+from motion_transfer.render.window import Window
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class DriverFile:
 
     def open(self) -> IuvReader:
         """Raises: InputError if it is gone, IuvFileError if it is not IUV."""
-        return open_reader(_open_stream(self.path, self.missing), self.order)
+        return open_reader(open_driver(self.path, self.missing), self.order)
 
 
 @dataclass(frozen=True)
@@ -108,10 +109,10 @@ def scan_driver(options: RenderOptions, folder: Path, listener: Listener) -> Dri
 
         if not is_cached():
             listener(Notice(FIRST_USE))
-    elif _are_pictures(options):
+    elif are_pictures(options):
         return _scan_pictures(options, folder, listener)
     missing = options.missing or "fail"
-    stream = _open_stream(options.driver, missing)
+    stream = open_driver(options.driver, missing)
     if stream.gaps:
         filled = "shows nobody" if missing == "background" else "repeats the frame before it"
         listener(Notice(f"{list_gaps(stream.gaps)}; each {filled}"))
@@ -136,8 +137,11 @@ def scan_driver(options: RenderOptions, folder: Path, listener: Listener) -> Dri
     )
 
 
-def _are_pictures(options: RenderOptions) -> bool:
-    """Raises: InputError if there is no such driver, or it cannot be told what it is."""
+def are_pictures(options: RenderOptions) -> bool:
+    """Whether the driver is raw pictures, not IUV.
+
+    Raises: InputError if there is no such driver, or it cannot be told what it is.
+    """
     if not options.driver.exists():
         raise InputError(f"driver {options.driver} does not exist")
     return (options.driver_kind or tell_kind(options.driver)) == "pictures"
@@ -182,13 +186,19 @@ def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
         where_found=scan.where_found,
         missing=options.missing,
         cuts=scan.pictures.cuts if scan.pictures else (),
+        window=given_window(options),
     )
+
+
+def given_window(options: RenderOptions) -> Window | None:
+    """The crop window that the options name; None for one around the person."""
+    window = parse_window(options.window)
+    return Window(*window) if window else None
 
 
 def choose_run_recipe(options: RenderOptions, plan: DriverPlan, listener: Listener) -> Recipe:
     """The renderer of a run. Raises: InputError, WeightsError."""
-    digest = digest_file(options.weights_file, "weights") if options.weights_file else ""
-    return choose_recipe(options, len(plan.frames), digest, listener)
+    return choose_recipe(options, len(plan.frames), digest_weights(options), listener)
 
 
 def prepare_run(
@@ -200,8 +210,7 @@ def prepare_run(
     source: Source,
 ) -> Prepared:
     """The parts put together. Raises: InputError, OutputError."""
-    driver = options.driver.resolve()
-    in_place = driver in (options.source.resolve(), source.iuv_path and source.iuv_path.resolve())
+    in_place = is_in_place(options, source)
     begins = scan.pictures.start_seconds if scan.pictures else 0
     key = run_key(
         options,
@@ -215,7 +224,7 @@ def prepare_run(
         driver=scan.file,
         plan=plan,
         recipe=recipe,
-        canvas=_canvas(options, output_format, scan, plan, recipe, source, in_place=in_place),
+        canvas=_checked_canvas(options, output_format, scan, plan, recipe, source),
         output_format=output_format,
         audio=choose_audio(
             options.audio,
@@ -238,7 +247,8 @@ def check_length(options: RenderOptions, output_format: OutputFormat, plan: Driv
         )
 
 
-def _open_stream(path: Path, missing: Missing) -> IuvStream:
+def open_driver(path: Path, missing: Missing) -> IuvStream:
+    """A driver of IUV frames, from a file, a folder or a motion's name. Raises: InputError."""
     if not is_motion(path):
         return open_stream(path, missing=missing)
     from motion_transfer.people.stream import open_motion
@@ -246,29 +256,41 @@ def _open_stream(path: Path, missing: Missing) -> IuvStream:
     return open_motion(path)
 
 
-def _canvas(
+def is_in_place(options: RenderOptions, source: Source) -> bool:
+    """Whether the driver is the source itself, or its IUV: its surroundings then stay."""
+    photo, iuv = options.source.resolve(), source.iuv_path and source.iuv_path.resolve()
+    return options.driver.resolve() in (photo, iuv)
+
+
+def make_canvas(
+    options: RenderOptions, height: int, width: int, working_size: int, source: Source
+) -> Canvas:
+    """An empty output for a driver of that size, px; `working_size` is the renderer's crop's."""
+    if options.size == "crop":
+        height = width = working_size
+    if options.size == "even":
+        height, width = height + height % 2, width + width % 2
+    comparison = Comparison(source, height, width) if options.compare else None
+    in_place = is_in_place(options, source)
+    background = make_background(options.background, (height, width), source, in_place=in_place)
+    return Canvas(background, crop=options.size == "crop", comparison=comparison)
+
+
+def _checked_canvas(
     options: RenderOptions,
     output_format: OutputFormat,
     scan: DriverScan,
     plan: DriverPlan,
     recipe: Recipe,
     source: Source,
-    *,
-    in_place: bool,
 ) -> Canvas:
-    if options.size == "crop":
-        height = width = recipe.working_size(plan.largest_side)
-    else:
-        height, width = scan.height, scan.width
-    if options.size == "even":
-        height, width = height + height % 2, width + width % 2
-    comparison = Comparison(source, height, width) if options.compare else None
-    if output_format.kind == "video" and output_format.codec.needs_even_size:
-        panel_height, panel_width = comparison.size if comparison else (height, width)
-        if panel_height % 2 or panel_width % 2:
-            raise OutputError(
-                f"{options.output}: {output_format.codec_name} cannot hold the odd size"
-                f" {panel_width} x {panel_height}; add --size even or --size crop, or write PNG"
-            )
-    background = make_background(options.background, (height, width), source, in_place=in_place)
-    return Canvas(background, crop=options.size == "crop", comparison=comparison)
+    working_size = recipe.working_size(plan.largest_side)
+    canvas = make_canvas(options, scan.height, scan.width, working_size, source)
+    width, height = canvas.size
+    even_only = output_format.kind == "video" and output_format.codec.needs_even_size
+    if even_only and (width % 2 or height % 2):
+        raise OutputError(
+            f"{options.output}: {output_format.codec_name} cannot hold the odd size"
+            f" {width} x {height}; add --size even or --size crop, or write PNG"
+        )
+    return canvas

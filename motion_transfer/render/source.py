@@ -18,7 +18,7 @@ from motion_transfer.media.iuv_stream import read_single_iuv
 from motion_transfer.render.beside import find_iuv_beside
 from motion_transfer.render.options import Garment, RenderOptions
 from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
-from motion_transfer.render.photo_person import SourcePerson, estimate_person
+from motion_transfer.render.photo_person import COVERS, SourcePerson, estimate_person
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
 from nhrr_core.iuv import PART_COUNT, PART_NAMES
 
@@ -232,5 +232,5 @@ def read_person(
     if len(person.regions) != people.region_count:
         iuv = isolate(iuv, person)
     if photo.alpha is not None:
-        iuv = iuv * (photo.alpha >= 128)[..., None]
+        iuv = iuv * (photo.alpha >= COVERS)[..., None]
     return iuv

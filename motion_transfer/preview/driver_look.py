@@ -1,0 +1,114 @@
+"""A driver that can be shown before it has been looked through."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from motion_transfer.errors import InputError
+from motion_transfer.media.iuv_stream import IuvReader, open_reader
+from motion_transfer.people.motion_name import is_motion
+from motion_transfer.render.events import Listener, Notice
+from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.person import People, find_people, take_as_one
+from motion_transfer.render.picture_driver import PictureDriver, estimate_driver
+from motion_transfer.render.plan import SeenFrame, digest_of_iuv
+from motion_transfer.render.prepare import are_pictures, open_driver
+
+BLOCK_FRAMES = 16
+
+
+@dataclass
+class DriverLook:
+    """What is known of a driver so far; written by the thread that looks, read by any.
+
+    Attributes:
+        seen: by frame, those that were looked at and could be read.
+        broken: by frame, why it cannot be read.
+        pictures: where the driver is raw pictures: what was made of them.
+        most_people: in any frame so far.
+    """
+
+    path: Path
+    reader: IuvReader
+    frame_rate: Fraction | None
+    pictures: PictureDriver | None = None
+    seen: dict[int, SeenFrame] = field(default_factory=dict)
+    broken: dict[int, str] = field(default_factory=dict)
+    most_people: int = 0
+
+    @property
+    def frame_count(self) -> int:
+        return self.reader.stream.frame_count
+
+    @property
+    def whole(self) -> bool:
+        """Every frame was looked at."""
+        return len({*self.seen, *self.broken}) == self.frame_count
+
+    def read(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
+        """One frame's IUV. Raises: InputError naming the frame that is broken."""
+        try:
+            return next(iter(self.reader.read(index, index + 1)))
+        except InputError as error:
+            self.broken[index] = str(error)
+            raise
+
+    def people_in(self, iuv: UInt8[np.ndarray, "H W 3"]) -> People:
+        """Everybody in a frame."""
+        return take_as_one(iuv) if self.pictures else find_people(iuv)
+
+    def look_at(self, frames: Iterable[int]) -> None:
+        """Look at single frames; broken ones are noted."""
+        for index in frames:
+            if index in self.seen or index in self.broken:
+                continue
+            try:
+                self._note(index, self.read(index))
+            except InputError:
+                continue
+
+    def look_through(self, stop: threading.Event, done: Callable[[int], object]) -> None:
+        """Look at every frame in order, until it is done or `stop` is set.
+
+        Args:
+            done: called with the number of frames looked at so far.
+        """
+        for start in range(0, self.frame_count, BLOCK_FRAMES):
+            block = range(start, min(start + BLOCK_FRAMES, self.frame_count))
+            if stop.is_set():
+                return
+            try:
+                for index, iuv in enumerate(self.reader.read(block.start, block.stop), start):
+                    self._note(index, iuv)
+            except InputError:  # one of them: the others can be read one by one
+                self.look_at(block)
+            done(block.stop)
+
+    def _note(self, index: int, iuv: UInt8[np.ndarray, "H W 3"]) -> None:
+        people = self.people_in(iuv)
+        self.most_people = max(self.most_people, len(people.persons))
+        self.seen[index] = SeenFrame(people, digest_of_iuv(iuv))
+
+
+def open_look(options: RenderOptions, folder: Path, listener: Listener) -> DriverLook:
+    """Open a driver; if it is raw pictures, find their IUV first, which takes a while.
+
+    Args:
+        folder: where the IUV of pictures is kept.
+    Raises: InputError if there is no such driver, or nothing in it can be read.
+    """
+    if not is_motion(options.driver) and are_pictures(options):
+        pictures = estimate_driver(options, folder, listener)
+        reader = open_reader(open_driver(pictures.iuv, "fail"), "iuv")
+        return DriverLook(options.driver, reader, pictures.frame_rate, pictures)
+    stream = open_driver(options.driver, options.missing or "fail")
+    for note in stream.notes:
+        listener(Notice(note))
+    return DriverLook(options.driver, open_reader(stream, options.iuv_order), stream.frame_rate)
