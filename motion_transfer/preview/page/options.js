@@ -5,8 +5,8 @@ import { byId, make, plural, say, setText } from "./dom.js";
 import { post } from "./server.js";
 
 const WORDS = {
-  nhrr: "nhrr, the network",
-  texture: "texture, a quick draft",
+  nhrr: "nhrr (network)",
+  texture: "texture (draft)",
   largest: "largest",
   white: "white",
   black: "black",

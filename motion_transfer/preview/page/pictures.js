@@ -8,8 +8,8 @@ export class PictureStore {
   /** `onArrival` is called whenever a picture or an error has come. */
   constructor(onArrival) {
     this.onArrival = onArrival;
-    this.kept = new Map(); // address -> {url, renderer} or {error}, the longest unused first
-    this.pending = new Map(); // address -> {abort, quick}
+    this.kept = new Map(); // address -> {url} or {error}, the longest unused first
+    this.pending = new Map(); // address -> {controller, quick}
     this.wanted = [];
     this.seconds = 0.05; // what a quick picture takes, a running mean
   }
@@ -85,16 +85,13 @@ export class PictureStore {
   }
 }
 
-/** {url, renderer}; {error} where there will never be a picture; null where it may come yet. */
+/** {url}; {error} where there will never be a picture; null where it may come yet. */
 async function load(address, signal) {
   try {
     const response = await fetch(address, { signal });
-    if (response.ok) {
-      const url = URL.createObjectURL(await response.blob());
-      return { url, renderer: response.headers.get("X-Renderer") };
-    }
-    // 409: the options have changed meanwhile; the next state brings the new key.
-    if (response.status === 409) return null;
+    if (response.ok) return { url: URL.createObjectURL(await response.blob()) };
+    // 409: the options have changed meanwhile; the next state brings the new key. 503: closing.
+    if ([409, 499, 503].includes(response.status)) return null;
     const { error } = await response.json().catch(() => ({}));
     return { error: error ?? `The server answered ${response.status} ${response.statusText}.` };
   } catch {

@@ -172,10 +172,10 @@ export class Stage {
     style.height = cut ? share(state.driver.height) : "100%";
   }
 
-  #label({ picture, draft }, layer) {
+  #label({ draft }, layer) {
     const badge = byId("quality");
     badge.hidden = layer.name !== "result";
-    const kind = draft || picture.renderer === "texture" ? "draft" : "network";
+    const kind = draft || this.looking.state.options.renderer === "texture" ? "draft" : "network";
     badge.dataset.kind = kind;
     const wait = draft && !this.looking.playing;
     badge.classList.toggle("busy", wait);
