@@ -28,6 +28,7 @@ export class Stage {
 
   /** Whether a frame is there, as it is seen when one stops at it. */
   hasFrame(frame) {
+    if (isStill(this.looking.view)) return false;
     const layers = layersOf(this.looking.view, this.looking.state);
     return layers.every((layer) => this.store.has(this.address(layer, frame)));
   }
