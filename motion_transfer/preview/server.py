@@ -55,6 +55,7 @@ class PreviewServer:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind((HOST, port))
+            self._socket.listen(128)  # a browser may come before the server has been started
         except (OSError, OverflowError) as error:
             self._socket.close()
             raise OutputError(
