@@ -18,13 +18,16 @@ const COLOUR_PAUSE_MS = 150; // a colour picker tells of every shade it passes
 
 /** Returns choose(changes), which posts options and shows what the server says to them. */
 export function setUpOptions(looking) {
-  const choose = async (changes) => {
+  const send = async (changes) => {
     const { ok, data } = await post("options", changes);
     for (const option of Object.keys(changes)) showFault(option, ok ? null : data.error);
     if (ok) looking.receive(data);
     else say(data.error);
     return ok;
   };
+  // One after the other: two that overtake each other would leave the older one standing.
+  let last = Promise.resolve();
+  const choose = (changes) => (last = last.then(() => send(changes)));
   for (const option of ["renderer", "person", "driver_person"]) {
     byId(option).addEventListener("change", (event) => choose({ [option]: event.target.value }));
   }
@@ -46,18 +49,23 @@ function setUpBackground(choose) {
   });
   colour.addEventListener("input", () => {
     clearTimeout(pause);
-    pause = setTimeout(() => choose({ background: colour.value }), COLOUR_PAUSE_MS);
+    colour.dataset.typed = "yes"; // states that come meanwhile know nothing of it yet
+    pause = setTimeout(async () => {
+      const shade = colour.value;
+      await choose({ background: shade });
+      if (colour.value === shade) delete colour.dataset.typed;
+    }, COLOUR_PAUSE_MS);
   });
 }
 
 function setUpRange(looking, choose) {
   // Whoever edits video expects the out point to be the last frame that is seen.
-  const post = () => {
+  const chooseRange = () => {
     const [first, last] = [byId("in").valueAsNumber, byId("out").valueAsNumber];
     if (Number.isFinite(first + last)) choose({ frames: [first, last + 1] });
   };
-  byId("in").addEventListener("change", post);
-  byId("out").addEventListener("change", post);
+  byId("in").addEventListener("change", chooseRange);
+  byId("out").addEventListener("change", chooseRange);
   byId("in-here").addEventListener("click", () => setIn(looking, choose));
   byId("out-here").addEventListener("click", () => setOut(looking, choose));
   byId("whole").addEventListener("click", () => choose({ frames: [0, looking.count] }));
@@ -83,7 +91,7 @@ function showOptions(looking) {
   const isNamed = BACKGROUNDS.includes(options.background);
   fill(byId("background"), BACKGROUNDS, isNamed ? options.background : "custom");
   byId("colour").hidden = isNamed;
-  if (!isNamed && /^#[0-9a-f]{6}$/i.test(options.background)) {
+  if (!isNamed && !byId("colour").dataset.typed && /^#[0-9a-f]{6}$/i.test(options.background)) {
     byId("colour").value = options.background;
   }
   showRange(looking);
