@@ -409,6 +409,7 @@ def test_a_saved_job_is_what_a_batch_runs(page, preview, mt) -> None:
     press(page, "Save job")
     expect(page.locator("#saved-words")).to_contain_text("preview.yaml")
     expect(page.get_by_label("The saved job")).to_contain_text("background: black")
+    press(page, "Close")
     batch = mt("batch", "run", preview.folder / "preview.yaml")
     assert batch.code == 0, batch.err
     with av.open(str(preview.folder / "out.webm")) as container:

@@ -137,7 +137,7 @@ function showWords(looking) {
 
 function describe({ state, shot, drawing }) {
   if (drawing) return "Drag a square on the picture.";
-  if (!shot) return "Not known yet.";
+  if (!shot) return state?.shots?.length ? "None here: outside the range." : "Not known yet.";
   if (state.options.window) return "Drawn by hand, for every frame.";
   const number = state.shots.indexOf(shot) + 1;
   const which = state.shots.length > 1 ? `, shot ${number} of ${state.shots.length}` : "";

@@ -141,7 +141,7 @@ function describePerson(word) {
 /** Words under the fields of an option, or none. */
 function showFault(option, words) {
   const fields = document.querySelectorAll(`[data-option="${option}"]`);
-  const home = fields[0]?.closest(".row, .field");
+  const home = fields[0]?.closest(".row") ?? fields[0]?.closest(".field");
   if (!home) return;
   const id = `fault-${option}`;
   byId(id)?.remove();

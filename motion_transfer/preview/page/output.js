@@ -9,7 +9,7 @@ const FILMS = [".mp4", ".mov", ".webm", ".mkv"];
 export function setUpOutput(looking) {
   let mine = false; // this page has asked for the rendering under way
   byId("render").addEventListener("click", async () => {
-    mine = (await postOrAsk("render", showRenderFault)) !== null;
+    mine = (await postOrAsk("render", looking.state.output)) !== null;
   });
   byId("stop").addEventListener("click", () => post("render/stop", {}));
   byId("watch").addEventListener("click", () => watch(looking.state));
@@ -19,7 +19,8 @@ export function setUpOutput(looking) {
     byId("film").removeAttribute("src");
     byId("film").load(); // lets go of the file
   });
-  byId("save").addEventListener("click", save);
+  byId("save").addEventListener("click", () => save(looking.state.job_file));
+  byId("saved-close").addEventListener("click", () => byId("saved").close());
   byId("copy").addEventListener("click", copy);
 
   let before = null;
@@ -39,7 +40,8 @@ export function setUpOutput(looking) {
   });
 }
 
-function showRenderFault(words) {
+/** What could not be begun or saved; it stays until something else is. */
+function showFault(words) {
   byId("render-words").classList.add("fault");
   setText(byId("render-words"), words);
 }
@@ -59,11 +61,12 @@ function showRender({ render, driver, error }) {
   setText(words, wordsOf(render));
 }
 
-function wordsOf({ status, done, total, message, output, seconds }) {
+function wordsOf({ status, stage, done, total, message, output, seconds }) {
+  const looked = { scan: " looked at", estimate: " searched for the person" }[stage] ?? "";
   const time = seconds == null ? "" : ` in ${seconds.toFixed(1)} s`;
   return {
     idle: `Writes ${output}.`,
-    running: total ? `${done} of ${plural(total, "frame")}` : "Beginning…",
+    running: total ? `${done} of ${plural(total, "frame")}${looked}` : "Beginning…",
     done: `Wrote ${output}${time}. ${message ?? ""}`.trim(),
     failed: message || "Rendering failed.",
     stopped: message || "Stopped. Render again to go on where it was.",
@@ -95,19 +98,12 @@ function watch({ render, revision, key }) {
   if (!byId("cinema").open) byId("cinema").showModal();
 }
 
-async function save() {
-  const done = await postOrAsk("job", (words) => showSaved(words, null));
+async function save(file) {
+  const done = await postOrAsk("job", file);
   if (!done) return;
-  showSaved(`Saved as ${done.path}. To render it: mt batch run ${done.path}`, done.text);
-  say(`Saved as ${done.path}.`);
-}
-
-function showSaved(words, text) {
-  byId("saved").hidden = false;
-  byId("saved-words").classList.toggle("fault", text === null);
-  setText(byId("saved-words"), words);
-  byId("saved-text").hidden = text === null;
-  setText(byId("saved-text"), text ?? "");
+  setText(byId("saved-words"), `${done.path}. To render it: mt batch run ${done.path}`);
+  setText(byId("saved-text"), done.text);
+  byId("saved").showModal();
 }
 
 async function copy() {
@@ -127,15 +123,15 @@ function confirmCopy(words) {
   setTimeout(() => setText(byId("copy"), "Copy command"), 2000);
 }
 
-/** Post; where something would be overwritten, ask first. Returns the answer, or null. */
-async function postOrAsk(path, onFault) {
+/** Post; where a file would be overwritten, ask first. Returns the answer, or null. */
+async function postOrAsk(path, file) {
   let answer = await post(path, { replace: false });
   if (answer.status === 409 && answer.data.exists) {
-    if (!(await ask(answer.data.error))) return null;
+    if (!(await ask(`${file} exists already. Replace it?`))) return null;
     answer = await post(path, { replace: true });
   }
   if (answer.ok) return answer.data;
-  onFault(answer.data.error);
+  showFault(answer.data.error);
   say(answer.data.error);
   return null;
 }
