@@ -5,11 +5,20 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motion_transfer.estimate.interface import Box, PersonEstimate
+from motion_transfer.estimate.body_fit import fit_landmarks
+from motion_transfer.estimate.interface import (
+    LANDMARK,
+    LANDMARK_COUNT,
+    Box,
+    Landmarks,
+    PersonEstimate,
+)
+from motion_transfer.estimate.proportions import BodyFit
 
 RED, GREEN, BLUE = (250, 0, 0), (0, 250, 0), (0, 0, 250)
 COLOURS = (RED, GREEN, BLUE)
@@ -52,6 +61,57 @@ class RectangleEstimator:
             alpha = np.where(mine[box.slices], 255, 20).astype(np.uint8)
             people.append(PersonEstimate(track, box, iuv, alpha, 0.9, None))
         return people
+
+
+class StandingEstimator:
+    """Red above blue is somebody who stands, with landmarks: trunk and legs; fitted if asked to."""
+
+    def __init__(self, fit: BodyFit | None = None) -> None:
+        self._fit = fit
+
+    def start_shot(self) -> None:
+        pass
+
+    def estimate(self, frame: np.ndarray) -> list[PersonEstimate]:
+        red, blue = ((np.abs(frame.astype(int) - c) < 60).all(-1) for c in (RED, BLUE))
+        _, regions = cv2.connectedComponents((red | blue).astype(np.uint8))
+        people = []
+        for track in range(1, regions.max() + 1):
+            upper, lower = red & (regions == track), blue & (regions == track)
+            if upper.sum() + lower.sum() > 50:
+                people.append(self._somebody(track, upper, lower))
+        return people
+
+    def _somebody(self, track: int, upper: np.ndarray, lower: np.ndarray) -> PersonEstimate:
+        columns = np.flatnonzero((upper | lower).any(0))[[0, -1]]
+        ends = np.flatnonzero(upper.any(1))[0], np.flatnonzero(lower.any(1))[[0, -1]]
+        landmarks = standing(int(columns.mean()), int(ends[0]), *(int(end) for end in ends[1]))
+        if self._fit is not None:
+            landmarks = fit_landmarks(landmarks, self._fit)
+        rows = landmarks.image[:, 1].round().astype(int)
+        hips, feet = rows[LANDMARK["left-hip"]], rows[LANDMARK["left-ankle"]]
+        box = Box(int(columns[0]), int(rows.min()), int(columns[1]) + 1, int(feet) + 1)
+        iuv = np.zeros((box.height, box.width, 3), np.uint8)
+        iuv[..., 0] = np.where(np.arange(box.top, box.bottom) < hips, 2, 10)[:, None]
+        iuv[..., 1] = np.linspace(30, 255, box.width)
+        iuv[..., 2] = np.linspace(30, 255, box.height)[:, None]
+        alpha = np.full((box.height, box.width), 255, np.uint8)
+        return PersonEstimate(track, box, iuv, alpha, 0.9, landmarks)
+
+
+def standing(x: int, top: int, hips: int, feet: int) -> Landmarks:
+    """Landmarks of somebody who stands upright in a picture: rows of ears, hips and ankles."""
+    neck = top + 0.3 * (hips - top)
+    heights = {"shoulder": neck, "elbow": (neck + hips) / 2, "hip": hips, "knee": (hips + feet) / 2}
+    heights |= dict.fromkeys(("wrist", "pinky", "index", "thumb"), hips)
+    heights |= dict.fromkeys(("ankle", "heel", "foot-index"), feet)
+    image = np.zeros((LANDMARK_COUNT, 3), np.float32)
+    for name, row in LANDMARK.items():
+        away = 6 if "left" in name else -6
+        image[row, :2] = x + away * (name != "nose"), heights.get(name.partition("-")[2], top)
+    world = (image - image[[LANDMARK["left-hip"], LANDMARK["right-hip"]]].mean(0)) / 50
+    sure = np.ones(LANDMARK_COUNT, np.float32)
+    return Landmarks(image, world, sure, sure)
 
 
 class RedModel(nn.Module):

@@ -18,10 +18,14 @@ Stage = Literal["begun", "preparing", "rendering", "assembling", "ended"]
 
 
 def scan_name(options: RenderOptions) -> str:
-    """Jobs of one name share a look at their driver."""
+    """Jobs of one name share a look at their driver; a fitted one is also its source's."""
+    fitted = ()
+    if options.fit_body:
+        fitted = (options.source, options.source_iuv, options.source_iuv_order, options.person)
     return _name(
         *("scan", options.driver, options.missing, options.iuv_order, options.frames),
         *(options.driver_kind, options.driver_person, options.estimator, options.estimator_model),
+        *fitted,
     )
 
 

@@ -120,6 +120,12 @@ def iuv() -> None:
     metavar="hold|background|fail",
     help="Frames in which nobody is found: repeat the frame before, background (default), or stop.",
 )
+@output_option(
+    "--alpha",
+    is_flag=True,
+    help="Write the people's alpha, too: me_IUV.png and me_alpha.png, dance.mkv and"
+    " dance_alpha.mkv.",
+)
 @with_options(OUTPUT_OPTIONS)
 def estimate(source: Path, output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
     """Find the people of raw pictures and write their IUV.
@@ -132,8 +138,10 @@ def estimate(source: Path, output: Path, fps: str | None, quiet: bool, **options
     mt iuv me.jpg -o me_IUV.png
     mt iuv dance.mp4 -o dance.mkv --person largest
     mt iuv dance.mp4 -o dance_iuv/ --estimator densepose --model densepose.pt
+    mt iuv me.jpg -o me_IUV.png --alpha
     """
     from motion_transfer.estimate.run import EstimateOptions, estimate_iuv
+    from motion_transfer.media.alpha_writing import name_alpha
     from motion_transfer.render.missing import list_stretches
     from motion_transfer.render.options import parse_rate
 
@@ -152,7 +160,8 @@ def estimate(source: Path, output: Path, fps: str | None, quiet: bool, **options
         _say_notes([f"nobody found in {seen.empty_count} frames, {shown}: {times}"])
     shots = f", {len(seen.shots)} shots" if len(seen.shots) > 1 else ""
     people = f", up to {seen.most_people} people" if seen.most_people > 1 else ""
-    click.echo(f"wrote {output}: {seen.frame_count} frames{shots}{people}")
+    written = f"{output} and {name_alpha(output)}" if settings.alpha else output
+    click.echo(f"wrote {written}: {seen.frame_count} frames{shots}{people}")
 
 
 @iuv.command(cls=SectionCommand)

@@ -18,6 +18,7 @@ from tqdm import tqdm
 from motion_transfer.render.events import Event, Finished, FramesDone, Listener, Notice, Stage
 
 STAGE_WORDS = {
+    "compare": "comparing bodies",
     "estimate": "finding the driver's person",
     "scan": "reading driver",
     "render": "rendering",

@@ -12,10 +12,12 @@ from motion_transfer.errors import InputError
 from motion_transfer.estimate.blazepose_landmarks import SeenBody
 from motion_transfer.estimate.blazepose_tracker import BodyTracker
 from motion_transfer.estimate.body_features import body_input, body_window
+from motion_transfer.estimate.body_fit import fit_body
 from motion_transfer.estimate.interface import Box, PersonEstimate
 from motion_transfer.estimate.iuv_network import IuvNetwork
 from motion_transfer.estimate.iuv_painting import paint_iuv
 from motion_transfer.estimate.iuv_weights import load_shipped
+from motion_transfer.estimate.proportions import BodyFit
 
 FAINT = 0.05
 """Of the mask; less is nobody."""
@@ -33,6 +35,7 @@ class BlazePoseEstimator:
             call `start_shot` before each, or turn it off.
         frame_rate: frames per second, for smoothing.
         threads: of each of BlazePose's networks; the painting network uses torch's.
+        fit: gives everybody other proportions, before their IUV is painted.
     Raises: InputError where the models or their package are missing; WeightsError.
     """
 
@@ -44,11 +47,13 @@ class BlazePoseEstimator:
         smooth: bool = True,
         frame_rate: float = 30.0,
         threads: int = 1,
+        fit: BodyFit | None = None,
     ) -> None:
         self._tracker = BodyTracker(
             most_people=most_people, smooth=smooth, frame_rate=frame_rate, threads=threads
         )
         self._network = network.fused() if network else load_shipped()
+        self._fit = fit
 
     def start_shot(self) -> None:
         """Forget who was where."""
@@ -73,6 +78,8 @@ class BlazePoseEstimator:
     def _painted(
         self, number: int, body: SeenBody, height: int, width: int
     ) -> PersonEstimate | None:
+        if self._fit is not None:
+            body = fit_body(body, self._fit)
         box = mask_on_frame(body, height, width, FAINT)
         if box is None:
             return None

@@ -5,12 +5,15 @@ from __future__ import annotations
 from fractions import Fraction
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.interface import Estimator
 from motion_transfer.estimate.model_files import MODEL_FILES, digest
 from motion_transfer.version import __version__
+
+if TYPE_CHECKING:
+    from motion_transfer.estimate.proportions import BodyFit
 
 ESTIMATORS = ("blazepose", "densepose")
 DEFAULT_RATE = Fraction(30)
@@ -33,7 +36,12 @@ def check_estimator(name: str, model: Path | None) -> None:
 
 
 def open_estimator(
-    name: str, model: Path | None, *, frame_rate: Fraction | None = None, threads: int = 1
+    name: str,
+    model: Path | None,
+    *,
+    frame_rate: Fraction | None = None,
+    threads: int = 1,
+    fit: BodyFit | None = None,
 ) -> Estimator:
     """An estimator ready for a clip.
 
@@ -41,16 +49,21 @@ def open_estimator(
         model: DensePose's file.
         frame_rate: of the clip, for smoothing; None: 30.
         threads: of BlazePose's networks.
-    Raises: InputError and WeightsError where a model or a package is missing, saying how to get it.
+        fit: other proportions for everybody; blazepose only.
+    Raises: InputError for a fit of what has no landmarks; InputError and WeightsError where a model
+        or a package is missing, saying how to get it.
     """
     check_estimator(name, model)
+    if fit is not None and name != "blazepose":
+        raise InputError(f"the {name} estimator gives no landmarks, so no body can be fitted")
     if name == "densepose" and model is not None:
         from motion_transfer.estimate.densepose import DensePoseEstimator
 
         return DensePoseEstimator(model)
     from motion_transfer.estimate.blazepose import BlazePoseEstimator
 
-    return BlazePoseEstimator(frame_rate=float(frame_rate or DEFAULT_RATE), threads=threads)
+    rate = float(frame_rate or DEFAULT_RATE)
+    return BlazePoseEstimator(frame_rate=rate, threads=threads, fit=fit)
 
 
 def estimator_facts(name: str, model: Path | None) -> dict[str, Any]:

@@ -36,6 +36,7 @@ class EstimateOptions:
         missing: what frames show in which nobody is found; see `estimate_clip`.
         output_order: the channel order to write, for pictures and video.
         frame_rate: of a video; None: the source's, or 30.
+        alpha: write the people's alpha beside the IUV, see `name_alpha`.
     """
 
     source: Path
@@ -47,6 +48,7 @@ class EstimateOptions:
     output_order: ChannelOrder = "vui"
     frame_rate: Fraction | None = None
     force: bool = False
+    alpha: bool = False
 
     def __post_init__(self) -> None:
         if self.missing not in get_args(MissingPeople):
@@ -88,13 +90,19 @@ def estimate_iuv(
         order=options.output_order,
         frame_rate=rate,
         force=options.force,
+        alpha=options.alpha,
     )
     check_iuv_output(options.output, settings)
     if estimator is None:
         estimator = open_estimator(options.estimator, options.model, frame_rate=pictures.frame_rate)
     summary = ClipSummary()
     frames = estimate_clip(
-        pictures, estimator, person=options.person, missing=options.missing, summary=summary
+        pictures,
+        estimator,
+        person=options.person,
+        missing=options.missing,
+        summary=summary,
+        with_alpha=options.alpha,
     )
     with closing(frames):
         write_iuv(frames, options.output, settings, lambda count: done(count, pictures.frame_count))

@@ -41,6 +41,17 @@ def lay_together(
     return iuv
 
 
+def lay_alpha(
+    people: Sequence[PersonEstimate], height: int, width: int
+) -> UInt8[np.ndarray, "H W"]:
+    """How much of each pixel of a frame is anybody; where several are, the most certain's."""
+    alpha = np.zeros((height, width), np.uint8)
+    for person in people:
+        place = person.box.slices
+        np.maximum(alpha[place], person.alpha, out=alpha[place])
+    return alpha
+
+
 def _touch(one: Box, other: Box) -> bool:
     return (
         one.left <= other.right

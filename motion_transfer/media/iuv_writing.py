@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
+from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError, OutputError
+from motion_transfer.media.alpha_writing import name_alpha, open_alpha
 from motion_transfer.media.formats import CODECS
 from motion_transfer.media.image import write_png
 from motion_transfer.media.iuv_image import CHANNEL_ORDERS, ChannelOrder
@@ -21,7 +23,7 @@ from motion_transfer.media.publish import check_destination, publish, work_folde
 IUV_ENDINGS = ("", ".png", ".mkv", ".npy")
 VIDEO_RATE = Fraction(30)  # where the frames come without a rate
 
-Frame = UInt8[np.ndarray, "H W 3"]
+Frame = UInt8[np.ndarray, "H W C"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +35,8 @@ class IuvFormat:
             DensePose, or `iuv`. Arrays are always (I, U, V).
         frame_rate: of a video; None: 30.
         force: replace an existing output.
+        alpha: frames have alpha as a fourth channel, which is written beside the IUV under the
+            name that `name_alpha` says, in the same form.
     """
 
     frame_count: int
@@ -41,6 +45,7 @@ class IuvFormat:
     order: ChannelOrder = "vui"
     frame_rate: Fraction | None = None
     force: bool = False
+    alpha: bool = False
 
 
 def check_iuv_output(output: Path, settings: IuvFormat) -> None:
@@ -65,6 +70,8 @@ def check_iuv_output(output: Path, settings: IuvFormat) -> None:
             " .mkv or .npy"
         )
     check_destination(output, force=settings.force)
+    if settings.alpha:
+        check_destination(name_alpha(output), force=settings.force)
 
 
 def write_iuv(
@@ -75,6 +82,9 @@ def write_iuv(
 ) -> None:
     """Write frames (I, U, V), H x W x 3 uint8, one at a time; the file gets its name at the end.
 
+    With alpha they are H x W x 4; both files get their names when both are finished, alpha first:
+    where there is new IUV, there is its alpha.
+
     Args:
         done: called with 1 after each frame.
     Raises: as `check_iuv_output`, and whatever `frames` raises; nothing half-written stays behind.
@@ -82,8 +92,13 @@ def write_iuv(
     check_iuv_output(output, settings)
     with work_folder(output) as folder:
         finished = folder / f"finished{output.suffix.lower()}"
+        alpha = folder / f"alpha{output.suffix.lower()}"
         write = {"": _write_folder, ".png": _write_png, ".mkv": _write_video, ".npy": _write_array}
-        write[output.suffix.lower()](_counted(frames, settings, done), finished, settings)
+        counted = _counted(frames, settings, done)
+        with closing(_without_alpha(counted, alpha, settings)) as iuv:
+            write[output.suffix.lower()](iuv, finished, settings)
+        if settings.alpha:
+            publish(alpha, name_alpha(output))
         publish(finished, output)
 
 
@@ -91,9 +106,9 @@ def _counted(
     frames: Iterable[Frame], settings: IuvFormat, done: Callable[[int], object]
 ) -> Iterable[Frame]:
     """The frames, each held to the promised size, and as many as promised."""
-    count = 0
+    count, shape = 0, (settings.height, settings.width, 4 if settings.alpha else 3)
     for count, frame in enumerate(frames, 1):
-        if count > settings.frame_count or frame.shape != (settings.height, settings.width, 3):
+        if count > settings.frame_count or frame.shape != shape:
             break
         yield frame
         done(1)
@@ -101,6 +116,25 @@ def _counted(
         if count == settings.frame_count:
             return
     raise ValueError(f"{settings} was promised, but frame {count} does not fit it")
+
+
+def _without_alpha(
+    frames: Iterable[Frame], path: Path, settings: IuvFormat
+) -> Generator[Frame, None, None]:
+    """The frames' IUV; their alpha, if they have one, is written on the way."""
+    if not settings.alpha:
+        yield from frames
+        return
+    with open_alpha(
+        path,
+        frame_count=settings.frame_count,
+        height=settings.height,
+        width=settings.width,
+        frame_rate=settings.frame_rate or VIDEO_RATE,
+    ) as write:
+        for frame in frames:
+            write(np.ascontiguousarray(frame[..., 3]))
+            yield np.ascontiguousarray(frame[..., :3])
 
 
 def _in_order(frame: Frame, order: ChannelOrder) -> Frame:

@@ -13,13 +13,12 @@ from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_stream import IuvReader, open_reader
-from motion_transfer.people.motion_name import is_motion
-from motion_transfer.render.events import Listener, Notice
+from motion_transfer.render.events import Listener
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.person import People, find_people, take_as_one
-from motion_transfer.render.picture_driver import PictureDriver, estimate_driver
+from motion_transfer.render.picture_driver import ORDER, PictureDriver, estimate_driver
 from motion_transfer.render.plan import SeenFrame, digest_of_iuv
-from motion_transfer.render.prepare import are_pictures, open_driver
+from motion_transfer.render.prepare import DriverFile, are_pictures, open_iuv_driver
 
 BLOCK_FRAMES = 16
 
@@ -104,11 +103,9 @@ def open_look(options: RenderOptions, folder: Path, listener: Listener) -> Drive
         folder: where the IUV of pictures is kept.
     Raises: InputError if there is no such driver, or nothing in it can be read.
     """
-    if not is_motion(options.driver) and are_pictures(options):
+    if are_pictures(options):
         pictures = estimate_driver(options, folder, listener)
-        reader = open_reader(open_driver(pictures.iuv, "fail"), "iuv")
+        reader = DriverFile(pictures.iuv, "fail", ORDER).open()
         return DriverLook(options.driver, reader, pictures.frame_rate, pictures)
-    stream = open_driver(options.driver, options.missing or "fail")
-    for note in stream.notes:
-        listener(Notice(note))
+    stream = open_iuv_driver(options, options.missing or "fail", listener)
     return DriverLook(options.driver, open_reader(stream, options.iuv_order), stream.frame_rate)

@@ -127,12 +127,13 @@ class Pictures:
     def _appearance(self, options: RenderOptions) -> Float[np.ndarray, "1 D T T"]:
         if options.renderer == "texture":
             raise InputError(NO_FEATURES)
-        return self._prepared(options)[0]
+        return self.prepared(options)[0]
 
     def _renderer(self, options: RenderOptions) -> Renderer:
-        return self._prepared(options)[1]
+        return self.prepared(options)[1]
 
-    def _prepared(self, options: RenderOptions) -> tuple[np.ndarray, Renderer]:
+    def prepared(self, options: RenderOptions) -> tuple[np.ndarray, Renderer]:
+        """What the renderer knows of the source, and the renderer. Raises: InputError."""
         recipe = self._recipe(options)
 
         def make() -> tuple[np.ndarray, Renderer]:

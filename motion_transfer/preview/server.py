@@ -55,7 +55,7 @@ class PreviewServer:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind((HOST, port))
-            self._socket.listen(128)  # a browser may come before the server has been started
+            self._socket.listen()  # a browser that is quicker than this program waits
         except (OSError, OverflowError) as error:
             self._socket.close()
             raise OutputError(
@@ -63,7 +63,12 @@ class PreviewServer:
             ) from error
         app = Guard(make_app(self._session, self._token, self._is_closing), self._token)
         config = uvicorn.Config(
-            app, log_level="error", lifespan="off", server_header=False, timeout_graceful_shutdown=1
+            app,
+            log_level="error",
+            lifespan="off",
+            server_header=False,
+            timeout_keep_alive=60,
+            timeout_graceful_shutdown=1,
         )
         self._server = uvicorn.Server(config)
 

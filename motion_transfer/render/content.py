@@ -24,7 +24,7 @@ SAID_OTHERWISE = {
     *("source", "source_iuv", "garments", "weights"),  # by the files' content
     *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
     *("frames", "frame_rate"),  # likewise
-    *("driver_kind", "estimator", "estimator_model"),  # by the source and the plan
+    *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
     *("renderer", "compile", "codec", "crf"),  # by the recipe and the format
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio"),  # made when everything is drawn
@@ -108,14 +108,27 @@ def chunk_key(run: str, plan: DriverPlan, chunk: Chunk) -> str:
 
 def driver_key(options: RenderOptions) -> str:
     """Of what decides the IUV of a driver that is raw pictures. Raises: InputError."""
+    fitted = {"fit": _fit_facts(options)} if options.fit_body else {}
     return key_of(
         {
             "driver": digest_file(options.driver, "driver"),
             "person": options.driver_person,
             "frames": options.frames,
+            **fitted,
             **_estimator_facts(options),
         }
     )
+
+
+def _fit_facts(options: RenderOptions) -> dict[str, Any]:
+    """What decides whose proportions a driver gets."""
+    iuv = options.source_iuv or find_iuv_beside(options.source)
+    return {
+        "source": digest_file(options.source, "source"),
+        "iuv": digest_file(iuv, "source") if iuv else None,
+        "order": options.source_iuv_order,
+        "person": options.person,
+    }
 
 
 def _estimator_facts(options: RenderOptions) -> dict[str, Any]:

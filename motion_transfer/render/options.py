@@ -142,6 +142,13 @@ class RenderOptions:
         kind="path",
         metavar="FILE",
     )
+    fit_body: bool = option(
+        "--fit-body",
+        "Raw pictures",
+        "Give the driver's body the proportions of the source's; needs blazepose.",
+        kind="flag",
+        default=False,
+    )
     garments: tuple[Garment, ...] = option(
         "--garment --garment-parts",
         "Garment transfer",
@@ -251,6 +258,11 @@ class RenderOptions:
         if self.estimator != "densepose" and self.estimator_model is not None:
             raise InputError(
                 "--estimator-model is for the densepose estimator; add --estimator densepose"
+            )
+        if self.fit_body and self.estimator != "blazepose":
+            raise InputError(
+                f"--fit-body compares landmarks, and the {self.estimator} estimator gives none;"
+                " choose the blazepose estimator, or leave out --fit-body"
             )
         if self.workers is not None and self.workers < 1:
             raise InputError(f"workers is {self.workers}; it must be at least 1")

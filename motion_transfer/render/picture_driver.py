@@ -20,6 +20,7 @@ from motion_transfer.media.iuv_writing import IuvFormat, write_iuv
 from motion_transfer.media.picture_stream import open_pictures
 from motion_transfer.media.publish import publish
 from motion_transfer.media.work import digest_of
+from motion_transfer.render.body_match import match_body
 from motion_transfer.render.content import driver_key
 from motion_transfer.render.events import FramesDone, Listener, Notice, Stage
 from motion_transfer.render.options import RenderOptions
@@ -30,7 +31,7 @@ ORDER: ChannelOrder = "iuv"
 
 @dataclass(frozen=True)
 class PictureDriver:
-    """The IUV of one person in a clip.
+    """The IUV of one person in a clip, fitted to a source's proportions if that was asked for.
 
     Attributes:
         iuv: the lossless video; as long as the clip, or as its used beginning.
@@ -73,8 +74,9 @@ def estimate_driver(options: RenderOptions, folder: Path, listener: Listener) ->
 def _make(options: RenderOptions, iuv: Path, key: str, listener: Listener) -> PictureDriver:
     pictures = open_pictures(options.driver)
     chosen = frame_range(options.frames, pictures.frame_count, str(options.driver))
+    fit = match_body(options, pictures, chosen, listener) if options.fit_body else None
     estimator = open_estimator(
-        options.estimator, options.estimator_model, frame_rate=pictures.frame_rate
+        options.estimator, options.estimator_model, frame_rate=pictures.frame_rate, fit=fit
     )
     listener(Stage("estimate", chosen.stop))
     summary = ClipSummary()

@@ -46,7 +46,7 @@ class DriverFile:
 
     def open(self) -> IuvReader:
         """Raises: InputError if it is gone, IuvFileError if it is not IUV."""
-        return open_reader(open_driver(self.path, self.missing), self.order)
+        return open_reader(_open_stream(self.path, self.missing), self.order)
 
 
 @dataclass(frozen=True)
@@ -104,20 +104,10 @@ def scan_driver(options: RenderOptions, folder: Path, listener: Listener) -> Dri
         folder: where the IUV of pictures is kept.
     Raises: InputError; IuvFileError naming the frame that is broken.
     """
-    if is_motion(options.driver):
-        from motion_transfer.people.figure.body import FIRST_USE, is_cached
-
-        if not is_cached():
-            listener(Notice(FIRST_USE))
-    elif are_pictures(options):
+    if are_pictures(options):
         return _scan_pictures(options, folder, listener)
     missing = options.missing or "fail"
-    stream = open_driver(options.driver, missing)
-    if stream.gaps:
-        filled = "shows nobody" if missing == "background" else "repeats the frame before it"
-        listener(Notice(f"{list_gaps(stream.gaps)}; each {filled}"))
-    for note in stream.notes:
-        listener(Notice(note))
+    stream = open_iuv_driver(options, missing, listener)
     reader = open_reader(stream, options.iuv_order)
     chosen = frame_range(options.frames, stream.frame_count, str(options.driver))
     listener(Stage("scan", len(chosen)))
@@ -137,11 +127,37 @@ def scan_driver(options: RenderOptions, folder: Path, listener: Listener) -> Dri
     )
 
 
+def open_iuv_driver(options: RenderOptions, missing: Missing, listener: Listener) -> IuvStream:
+    """A driver that is IUV or a motion, with everything to be known of it said.
+
+    Raises: InputError if it cannot be read, or an option does not go with it.
+    """
+    if options.fit_body:
+        raise InputError(
+            f"--fit-body compares landmarks, and IUV as in the driver {options.driver} has none;"
+            " give the video or pictures that it was made from, or leave out --fit-body"
+        )
+    if is_motion(options.driver):
+        from motion_transfer.people.figure.body import FIRST_USE, is_cached
+
+        if not is_cached():
+            listener(Notice(FIRST_USE))
+    stream = _open_stream(options.driver, missing)
+    if stream.gaps:
+        filled = "shows nobody" if missing == "background" else "repeats the frame before it"
+        listener(Notice(f"{list_gaps(stream.gaps)}; each {filled}"))
+    for note in stream.notes:
+        listener(Notice(note))
+    return stream
+
+
 def are_pictures(options: RenderOptions) -> bool:
     """Whether the driver is raw pictures, not IUV.
 
     Raises: InputError if there is no such driver, or it cannot be told what it is.
     """
+    if is_motion(options.driver):
+        return False
     if not options.driver.exists():
         raise InputError(f"driver {options.driver} does not exist")
     return (options.driver_kind or tell_kind(options.driver)) == "pictures"
@@ -247,8 +263,7 @@ def check_length(options: RenderOptions, output_format: OutputFormat, plan: Driv
         )
 
 
-def open_driver(path: Path, missing: Missing) -> IuvStream:
-    """A driver of IUV frames, from a file, a folder or a motion's name. Raises: InputError."""
+def _open_stream(path: Path, missing: Missing) -> IuvStream:
     if not is_motion(path):
         return open_stream(path, missing=missing)
     from motion_transfer.people.stream import open_motion

@@ -21,7 +21,7 @@ LARGEST_STRETCH = 2.0  # in a gap; a part that grows more was matched wrongly
 JOIN_SHARE = 0.03  # of the frame's height: regions this close are one person
 CRACK_PX = 5
 
-Frame = UInt8[np.ndarray, "H W 3"]
+Frame = UInt8[np.ndarray, "H W C"]
 Mask = Bool[np.ndarray, "H W"]
 Movement = Float[np.ndarray, "2 3"]
 """An affine map of (x, y) px: from a place to where it is in the other frame."""

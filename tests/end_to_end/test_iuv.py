@@ -84,6 +84,65 @@ def test_a_video_with_gaps(tmp_path: Path, mt, red, output: str) -> None:
         assert open_stream(tmp_path / output).frame_rate == Fraction(30000, 1001)
 
 
+def alpha_of(path: Path) -> list[np.ndarray]:
+    """The frames of an alpha folder, picture, video or stack."""
+    if path.suffix == ".npy":
+        return list(np.load(path))
+    if path.suffix == ".mkv":
+        with av.open(str(path)) as container:
+            assert container.streams.video[0].codec_context.pix_fmt == "gray"
+            assert container.streams.video[0].average_rate == 25
+            return [frame.to_ndarray() for frame in container.decode(video=0)]
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [np.asarray(Image.open(file)) for file in files]
+
+
+@pytest.mark.parametrize(
+    ("output", "alpha"),
+    [
+        ("me_IUV.png", "me_alpha.png"),
+        ("me.png", "me_alpha.png"),
+        ("dance_iuv", "dance_alpha"),
+        ("dance.mkv", "dance_alpha.mkv"),
+        ("dance.npy", "dance_alpha.npy"),
+    ],
+)
+def test_alpha_is_written_beside(tmp_path: Path, mt, red, output: str, alpha: str) -> None:
+    frames = [somebody(3 * i) for i in range(1 if output.endswith(".png") else 4)]
+    if len(frames) > 1:
+        frames[2] = scene(size=SIZE)
+    source, out = film(tmp_path / "clip.mp4", frames), tmp_path / "out"
+    words = ["iuv", source, "-o", out / output, "--alpha", *red, "--missing", "hold"]
+    outcome = mt(*words)
+    assert outcome.code == 0, outcome.err
+    assert f"{output} and {out / alpha}: {len(frames)} frames" in outcome.out
+    assert sorted(p.name for p in out.iterdir()) == sorted([output, alpha])
+    found = alpha_of(out / alpha)
+    assert len(found) == len(frames)
+    for index, (matte, iuv) in enumerate(zip(found, frames_of(out / output), strict=True)):
+        x = 10 + 3 * (1 if index == 2 else index)  # held
+        assert (matte.shape, matte.dtype) == (SIZE, np.uint8)
+        assert matte[20:76, x + 4 : x + 26].min() == 255 and matte[:, : x - 4].max() == 0
+        np.testing.assert_array_equal(matte > 0, iuv[..., 0] > 0)
+    refused = mt(*words)
+    assert refused.code == 2 and "exists already" in refused.err
+    assert mt(*words, "--force").code == 0
+    assert sorted(p.name for p in out.iterdir()) == sorted([output, alpha])
+
+
+def test_alpha_and_iuv_come_together_or_not_at_all(tmp_path: Path, mt, red) -> None:
+    frames = [somebody(), scene(size=SIZE), somebody()]
+    video = film(tmp_path / "dance.mp4", frames)
+    words = ["iuv", video, "-o", tmp_path / "dance.mkv", "--alpha", *red]
+    assert mt(*words, "--missing", "fail").code == 2
+    assert [p.name for p in tmp_path.iterdir()] == ["dance.mp4"]
+    (tmp_path / "dance_alpha.mkv").write_bytes(b"mine")
+    outcome = mt(*words)
+    assert outcome.code == 2 and "dance_alpha.mkv exists already" in outcome.err
+    assert not (tmp_path / "dance.mkv").exists()
+    assert (tmp_path / "dance_alpha.mkv").read_bytes() == b"mine"
+
+
 def test_half_written_output_is_never_left(tmp_path: Path, mt, red) -> None:
     frames = [somebody(), scene(size=SIZE), somebody()]
     video = film(tmp_path / "dance.mp4", frames)

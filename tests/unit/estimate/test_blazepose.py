@@ -21,6 +21,7 @@ from motion_transfer.estimate.blazepose_landmarks import LandmarkModel, refine
 from motion_transfer.estimate.blazepose_tracker import BodyTracker, tiles
 from motion_transfer.estimate.interface import LANDMARK, LANDMARK_NAMES, Box
 from motion_transfer.estimate.iuv_network import IuvNetwork, IuvNetworkConfig
+from motion_transfer.estimate.proportions import BONES, BodyFit
 
 MEDIAN_AWAY, MOST_AWAY = 0.006, 0.05
 """Of the person's height; the farthest are single landmarks whose heat map is at the limit at which
@@ -224,3 +225,17 @@ def test_somebody_who_leaves_is_lost_and_found_again(estimator) -> None:
     assert estimator.estimate(nobody) == []
     (again,) = estimator.estimate(photo)
     assert again.track > first.track
+
+
+def test_a_fitted_person_has_another_body(models, estimator) -> None:
+    photo = data.astronaut()
+    (before,) = estimate(estimator, photo)
+    network = IuvNetwork(IuvNetworkConfig(widths=(8, 8, 8, 8), code=8))
+    fit = BodyFit(dict.fromkeys(BONES, 1.0) | {"head": 0.7})
+    (after,) = BlazePoseEstimator(network=network, fit=fit).estimate(photo)
+    ears = [LANDMARK["left-ear"], LANDMARK["right-ear"]]
+    width = [np.ptp(person.landmarks.image[ears, 0]) for person in (before, after)]
+    assert width[1] / width[0] == pytest.approx(0.7, abs=0.02)
+    chin = before.landmarks.image[LANDMARK["mouth-left"], 1].astype(int)
+    heads = [(person.on_frame(512, 512)[1][:chin] > 127).sum() for person in (before, after)]
+    assert heads[1] < 0.7 * heads[0]

@@ -14,6 +14,7 @@ from motion_transfer.render.options import (
     parse_frames,
     parse_parts,
     parse_rate,
+    parse_window,
 )
 from nhrr_core import PART_GROUPS, PART_NAMES
 
@@ -115,3 +116,14 @@ def options(**changes) -> RenderOptions:
 def test_bad_options(changes: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         options(**changes)
+
+
+def test_windows() -> None:
+    assert parse_window("auto") is None
+    assert parse_window("-10,20,300") == (-10, 20, 300)
+
+
+@pytest.mark.parametrize("text", ["", "1,2", "1,2,3,4", "a,b,c", "0,0,15", "0,0,99999", "1.5,2,30"])
+def test_bad_windows(text: str) -> None:
+    with pytest.raises(InputError, match=f"window '{text}'; "):
+        options(window=text)

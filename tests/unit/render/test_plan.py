@@ -10,13 +10,16 @@ import pytest
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_stream import open_reader, open_stream
 from motion_transfer.render.missing import FramePlan, list_stretches
+from motion_transfer.render.person import People, Person
 from motion_transfer.render.plan import (
     CHUNK_FRAMES,
     DriverPlan,
+    SeenFrame,
     frame_range,
     plan_path,
     scan_people,
 )
+from motion_transfer.render.window import Window
 
 
 def plan(studio, iuvs: np.ndarray, **changes) -> DriverPlan:
@@ -180,3 +183,22 @@ def test_chunks_are_divided_at_cuts(studio) -> None:
     pieces = [[(s.start, s.stop) for s in planned.shots_in(chunk)] for chunk in planned.chunks]
     second = CHUNK_FRAMES
     assert pieces == [[(0, 7), (7, second)], [(second, second + 3), (second + 3, second + 10)]]
+
+
+def test_a_given_window_is_every_shots() -> None:
+    seen = [SeenFrame(People((Person(4, 5, 20, 60, 500, (1,)),), 1), "")] * 6
+    planned = plan_path(
+        seen,
+        chosen=range(6),
+        frame_rate=Fraction(25),
+        person="largest",
+        where="d",
+        where_first="d",
+        where_found="d",
+        cuts=(3,),
+        window=Window(1, 2, 99),
+    )
+    assert [(s.start, s.stop, s.window) for s in planned.shots] == [
+        (0, 3, Window(1, 2, 99)),
+        (3, 6, Window(1, 2, 99)),
+    ]

@@ -1,0 +1,317 @@
+"""A preview shows what the run will make, and stays whole whatever is asked of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from motion_transfer.batch.expand import expand
+from motion_transfer.batch.manifest_file import read_manifest
+from motion_transfer.errors import InputError, OutputError
+from motion_transfer.media.image import read_photo
+from motion_transfer.preview.draw_queue import StaleError
+from motion_transfer.preview.driver_look import open_look
+from motion_transfer.preview.frame_plans import plan_frames
+from motion_transfer.preview.pictures import NO_FEATURES, Pictures, project_features
+from motion_transfer.preview.session import Session
+from motion_transfer.render.events import ignore
+from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.run import run
+
+COUNT = 40
+
+
+@pytest.fixture
+def options(studio, tmp_path: Path) -> RenderOptions:
+    return RenderOptions(
+        source=studio.source(),
+        driver=studio.driver(COUNT),
+        output=tmp_path / "out",
+        renderer="texture",
+    )
+
+
+@pytest.fixture
+def open_session(tmp_path: Path) -> Iterator[Callable[[RenderOptions], Session]]:
+    sessions = []
+
+    def make(options: RenderOptions) -> Session:
+        sessions.append(Session(options, tmp_path / "job.yaml"))
+        return sessions[-1]
+
+    yield make
+    for session in sessions:
+        session.close()
+
+
+def picture(data: bytes) -> np.ndarray:
+    return np.asarray(Image.open(BytesIO(data)).convert("RGB"))
+
+
+def look_through(options: RenderOptions):
+    look = open_look(options, options.output.parent, ignore)
+    look.look_through(Event(), lambda _count: None)
+    return look
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"frames": (5, 20)},
+        {"window": "-3,4,64"},
+        {"background": "photo", "size": "crop"},
+        {"compare": False, "size": "even", "missing": "hold"},
+    ],
+)
+def test_a_frame_is_the_one_that_the_run_draws(options: RenderOptions, changes: dict) -> None:
+    options = replace(options, **changes)
+    run(options)
+    look, pictures = look_through(options), Pictures()
+    plans = plan_frames(look, options)
+    assert plans.exact
+    for index in (plans.chosen.start, 12, plans.chosen.stop - 1):
+        drawn = read_photo(options.output / f"{index - plans.chosen.start:06d}.png").rgb
+        assert np.array_equal(pictures.result(options, look, plans, index), drawn)
+
+
+def test_a_frame_of_the_network_is_the_one_that_the_run_draws(
+    options: RenderOptions, checkpoint: Path
+) -> None:
+    options = replace(options, renderer="nhrr", weights=checkpoint, frames=(0, 3))
+    run(options)
+    look = look_through(options)
+    shown = Pictures().result(options, look, plan_frames(look, options), 2)
+    drawn = read_photo(options.output / "000002.png").rgb
+    assert np.abs(shown.astype(int) - drawn).max() <= 1  # batches of one and of four may differ
+
+
+def test_before_the_driver_is_looked_through_a_sample_decides(options: RenderOptions) -> None:
+    look = open_look(options, options.output.parent, ignore)
+    plans = plan_frames(look, options)
+    assert not plans.exact
+    assert len(look.seen) < COUNT
+    look.look_through(Event(), lambda _count: None)
+    whole = plan_frames(look, options).shots[0].window
+    near = plans.shots[0].window
+    assert abs(near.x - whole.x) <= 4
+    assert abs(near.side - whole.side) <= 8
+    assert Pictures().result(options, look, plans, 1).shape == (96, 64, 3)
+
+
+def test_frames_outside_the_chosen_ones_can_be_seen(options: RenderOptions) -> None:
+    options = replace(options, frames=(10, 20))
+    look = look_through(options)
+    plans = plan_frames(look, options)
+    for index in (0, 39):
+        assert len(np.unique(Pictures().result(options, look, plans, index))) > 5
+
+
+def test_a_broken_frame_is_marked_and_the_others_are_shown(
+    options: RenderOptions, open_session
+) -> None:
+    (options.driver / "frame_7_IUV.png").write_bytes(b"no picture")
+    session = open_session(options)
+    session.wait_for_plan()
+    state = session.state()
+    assert list(state["broken"]) == [7]
+    assert "frame_7_IUV.png" in state["broken"][7]
+    with pytest.raises(InputError, match="frame_7_IUV"):
+        session.ask_frame(7, "result", session.key).result()
+    assert picture(session.ask_frame(8, "result", session.key).result()).shape == (96, 64, 3)
+
+
+@pytest.mark.parametrize("view", ["result", "iuv"])
+def test_views_of_a_frame(options: RenderOptions, open_session, view: str) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    shown = picture(session.ask_frame(3, view, session.key).result())
+    assert shown.shape == (96, 64, 3)
+    assert len(np.unique(shown.reshape(-1, 3), axis=0)) > 8
+
+
+def test_views_of_the_source(options: RenderOptions, open_session, checkpoint: Path) -> None:
+    session = open_session(replace(options, renderer="nhrr", weights=checkpoint))
+    session.wait_for_plan()
+    assert picture(session.ask_still("source").result()).shape == (192, 128, 3)
+    assert picture(session.ask_still("texture").result()).shape == (64, 64, 3)
+    assert picture(session.ask_still("map").result()).shape == (64, 64, 3)
+    features = picture(session.ask_frame(3, "features", session.key).result())
+    assert features.shape == (64, 64, 3)
+    assert (features[0, 0] == 255).all()
+
+
+def test_the_texture_renderer_has_no_feature_map(options: RenderOptions, open_session) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    for future in (session.ask_still("map"), session.ask_frame(0, "features", session.key)):
+        with pytest.raises(InputError, match=NO_FEATURES):
+            future.result()
+
+
+def test_a_draft_is_drawn_without_the_network(
+    options: RenderOptions, open_session, checkpoint: Path
+) -> None:
+    session = open_session(replace(options, renderer="nhrr", weights=checkpoint))
+    session.wait_for_plan()
+    draft = session.ask_frame(3, "result", session.key, draft=True).result()
+    session.change({"renderer": "texture"})
+    assert session.ask_frame(3, "result", session.key).result() == draft
+
+
+def test_an_option_changes_the_pictures_and_their_key(options: RenderOptions, open_session) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    before, revision = session.key, session.revision
+    session.change({"background": "#102030"})
+    assert session.revision > revision
+    with pytest.raises(StaleError):
+        session.ask_frame(0, "result", before)
+    corner = picture(session.ask_frame(0, "result", session.key).result())[0, 0]
+    assert np.abs(corner.astype(int) - (16, 32, 48)).max() <= 3
+    session.change({"background": "white"})
+    assert session.key == before
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ({"background": "mauve"}, "background 'mauve'"),
+        ({"renderer": "gan"}, "renderer is 'gan'"),
+        ({"person": "4"}, "person"),
+        ({"driver_person": "4"}, "person"),
+        ({"frames": "50:60"}, "has 40"),
+        ({"window": "1,2"}, "write X,Y,SIDE"),
+        ({"window": "1,2,3"}, "between 16 and"),
+        ({"frame_rate": "0"}, "between 0 and 1000"),
+        ({"output": "/etc/passwd"}, "option 'output'"),
+        ({"source": "/etc/passwd"}, "option 'source'"),
+        ({"background": "black", "frames": "9:3"}, "frames 9:3"),
+    ],
+)
+def test_what_cannot_be_changes_nothing(
+    options: RenderOptions, open_session, words: dict, reason: str
+) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    before = session.key
+    with pytest.raises(InputError, match=reason):
+        session.change(words)
+    assert session.options == options
+    assert session.key == before
+
+
+@pytest.mark.parametrize(
+    ("index", "view", "reason"),
+    [(COUNT, "result", "has 40"), (-1, "result", "has 40"), (0, "../secret", "view '../secret'")],
+)
+def test_there_are_only_so_many_pictures(
+    options: RenderOptions, open_session, index: int, view: str, reason: str
+) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    with pytest.raises(InputError, match=reason):
+        session.ask_frame(index, view, session.key)
+    with pytest.raises(InputError, match="view 'nothing'"):
+        session.ask_still("nothing")
+
+
+def test_rendering_makes_what_the_run_makes(options: RenderOptions, open_session) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    session.change({"background": "black", "frames": "3:9"})
+    session.render(replace_output=False)
+    wait_for(lambda: session.rendering.progress.status != "running")
+    progress = session.rendering.progress
+    assert (progress.status, progress.done, progress.total) == ("done", 6, 6)
+    first = read_photo(options.output / "000000.png").rgb
+    assert (first[0, 0] == 0).all()
+    with pytest.raises(OutputError, match="exists already"):
+        session.render(replace_output=False)
+    session.render(replace_output=True)
+    wait_for(lambda: session.rendering.progress.status != "running")
+    assert session.rendering.progress.status == "done"
+
+
+def test_a_stopped_run_leaves_nothing_under_the_final_name(
+    options: RenderOptions, open_session
+) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    session.rendering._hear = stop_at_first(session.rendering)
+    session.render(replace_output=False)
+    wait_for(lambda: session.rendering.progress.status != "running")
+    assert session.rendering.progress.status == "stopped"
+    assert not options.output.exists()
+
+
+def test_a_run_that_fails_says_why(options: RenderOptions, open_session) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    options.source.unlink()
+    session.render(replace_output=False)
+    wait_for(lambda: session.rendering.progress.status != "running")
+    assert session.rendering.progress.status == "failed"
+    assert "does not exist" in session.rendering.progress.message
+
+
+def test_a_saved_job_is_the_run(options: RenderOptions, open_session, tmp_path: Path) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    session.change({"frames": "3:9", "window": "1,2,60", "frame_rate": "30000/1001"})
+    session.save_job(replace_file=False)
+    (job,) = expand(*read_manifest(tmp_path / "job.yaml"))
+    assert job.options == session.options
+    with pytest.raises(OutputError, match="exists already"):
+        session.save_job(replace_file=False)
+    session.save_job(replace_file=True)
+
+
+def test_a_driver_that_is_none_is_said_in_words(options: RenderOptions, open_session) -> None:
+    session = open_session(replace(options, driver=options.driver.with_name("gone")))
+    with pytest.raises(InputError, match="gone does not exist"):
+        session.wait_for_plan()
+    state = session.state()
+    assert "does not exist" in state["error"]
+    assert state["driver"] is None
+
+
+def test_a_source_that_is_none_is_said_in_words(options: RenderOptions, open_session) -> None:
+    session = open_session(replace(options, source=options.source.with_name("gone.png")))
+    wait_for(lambda: session.error is not None)
+    assert "gone.png does not exist" in session.state()["error"]
+
+
+def test_the_same_features_have_the_same_colours_in_map_and_image() -> None:
+    features = np.random.default_rng(1).normal(size=(16, 8, 8)).astype(np.float32)
+    mean, deviation = np.zeros(3), np.ones(3)
+    whole = project_features(features, mean, deviation)
+    assert np.array_equal(project_features(features[:, 2:4, 5:6], mean, deviation), whole[2:4, 5:6])
+    assert whole.dtype == np.uint8
+    assert len(np.unique(whole)) > 50
+
+
+def stop_at_first(rendering) -> Callable:
+    hear = type(rendering)._hear
+
+    def listen(event) -> None:
+        rendering.stop()
+        hear(rendering, event)
+
+    return listen
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    for _ in range(600):
+        if condition():
+            return
+        time.sleep(0.05)
+    raise AssertionError("it did not happen within half a minute")
