@@ -1,0 +1,72 @@
+// What the server has to say besides: what it is doing, what is wrong with frames, who is asked.
+
+import { byId, make, plural, setText, toRanges } from "./dom.js";
+
+const WORK = {
+  estimate: "Finding the person in the pictures",
+  scan: "Looking at every frame",
+  source: "Reading the photo",
+};
+const SHOWN = 8; // ranges of frames; more are counted
+
+export function setUpNotes(looking) {
+  looking.addEventListener("state", () => {
+    const { state } = looking;
+    showSubject(state);
+    showWork(state.work);
+    showNotes(looking);
+  });
+}
+
+function showSubject({ source, driver }) {
+  const names = [source?.name ?? "…", driver?.name ?? "…"];
+  setText(byId("subject"), `${names[0]} in the motion of ${names[1]}`);
+  const size = driver ? `${driver.width} × ${driver.height}, ${plural(driver.frame_count, "frame")}` : "";
+  byId("subject").title = size;
+  document.title = `${names[0]} · ${names[1]} · mt preview`;
+}
+
+function showWork(work) {
+  byId("work").hidden = !work;
+  if (!work) return;
+  const { stage, done, total } = work;
+  const share = total ? ` ${done} of ${total}` : "";
+  setText(byId("work-words"), `${WORK[stage] ?? stage}${share}`);
+  const bar = byId("work-bar");
+  if (total) Object.assign(bar, { max: total, value: done });
+  else bar.removeAttribute("value");
+}
+
+function showNotes(looking) {
+  const { notices = [], broken = {}, missing = [] } = looking.state;
+  const bad = toRanges(Object.keys(broken).map(Number).sort((a, b) => a - b));
+  const signature = JSON.stringify([notices, bad, missing]);
+  const list = byId("note-list");
+  if (list.dataset.signature === signature) return; // a focused button stays what it is
+  list.dataset.signature = signature;
+  const items = notices.map((words) => make("li", { textContent: words }));
+  if (bad.length) items.push(rangesNote(looking, "Broken", "broken", bad));
+  if (missing.length) items.push(rangesNote(looking, "Nobody found in", "missing", missing));
+  byId("notes").hidden = items.length === 0;
+  list.replaceChildren(...items);
+}
+
+/** "Broken: 17, 30–32", each a button that goes there. */
+function rangesNote(looking, words, kind, ranges) {
+  const item = make("li", { className: kind }, make("span", { className: "swatch" }), `${words} `);
+  for (const [start, stop] of ranges.slice(0, SHOWN)) {
+    const label = stop - start > 1 ? `${start}–${stop - 1}` : `${start}`;
+    const button = make("button", { type: "button", className: "link", textContent: label });
+    button.setAttribute("aria-label", `${words} ${label}: go there`);
+    button.addEventListener("click", () => looking.look({ frame: start, playing: false }));
+    item.append(button, " ");
+  }
+  if (ranges.length > SHOWN) item.append(`and ${ranges.length - SHOWN} more`);
+  return item;
+}
+
+/** Say that nobody answers, or (with null) that somebody does again. */
+export function showLost(words) {
+  byId("lost").hidden = words === null;
+  setText(byId("lost"), words ?? "");
+}

@@ -1,0 +1,79 @@
+// The views: what each is made of, and the buttons that choose one.
+
+import { byId, make } from "./dom.js";
+
+const frame = (view) => (index) => `frame/${index}/${view}`;
+const still = (view) => () => `still/${view}`;
+
+// `drafts`: a quick stand-in is there while the picture is under way. `onFrame`: drawn on the
+// driver's frame, so that a crop window can be drawn on it. `quick`: comes within a moment.
+const PICTURES = {
+  result: { path: frame("result"), drafts: true },
+  iuv: { path: frame("iuv"), onFrame: true, quick: true },
+  pictures: { path: frame("pictures"), onFrame: true, quick: true },
+  features: { path: frame("features") },
+  source: { path: still("source"), still: true, quick: true },
+  texture: { path: still("texture"), still: true, quick: true },
+  map: { path: still("map"), still: true },
+};
+
+const VIEWS = [
+  ["result", "Result"],
+  ["compare", "Compare"],
+  ["iuv", "IUV"],
+  ["pictures", "Picture"],
+  ["source", "Source"],
+  ["texture", "Partial texture"],
+  ["map", "Feature map"],
+  ["features", "Feature image"],
+];
+
+export const NAMES = Object.fromEntries(VIEWS);
+
+/** What a view shows, the lowest first: one picture, or two for `compare`. */
+export function layersOf(view, state) {
+  if (view !== "compare") return [{ name: view, ...PICTURES[view] }];
+  const below = driverView(state);
+  return [
+    { name: below, ...PICTURES[below] },
+    { name: "result", ...PICTURES.result },
+  ];
+}
+
+/** The view of the driver itself. */
+export function driverView(state) {
+  return state.driver?.pictures ? "pictures" : "iuv";
+}
+
+/** Whether the crop window can be shown on this view. */
+export function showsDriverFrame(view, looking) {
+  if (PICTURES[view]?.onFrame) return true;
+  return (view === "result" || view === "compare") && looking.isWhole;
+}
+
+export function isStill(view) {
+  return Boolean(PICTURES[view]?.still);
+}
+
+/** The row of buttons. Buttons rather than radios: the arrow keys belong to the frames. */
+export function setUpViews(looking) {
+  const buttons = new Map();
+  for (const [view, label] of VIEWS) {
+    const button = make("button", { type: "button", textContent: label });
+    button.addEventListener("click", () => looking.look({ view }));
+    buttons.set(view, button);
+    byId("views").append(button);
+  }
+  looking.addEventListener("look", () => {
+    for (const [view, button] of buttons) {
+      button.setAttribute("aria-pressed", String(view === looking.view));
+    }
+    buttons.get("pictures").hidden = !looking.state?.driver?.pictures;
+  });
+}
+
+/** The view of a digit key, or undefined. */
+export function viewOfKey(key, state) {
+  const there = VIEWS.filter(([view]) => view !== "pictures" || state?.driver?.pictures);
+  return there[Number(key) - 1]?.[0];
+}

@@ -1,0 +1,515 @@
+"""The page of `mt preview` in a browser, served by the real command."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import av
+import pytest
+from PIL import Image
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+expect = playwright.expect
+
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs a chromium")
+
+DEMO = Path(str(files("motion_transfer.demo")))
+FRAMES, SIDE_PX = 120, 320  # of the demo's driver
+START_SECONDS = 60
+VIEWS = ("Result", "Compare", "IUV", "Source", "Partial texture", "Feature map", "Feature image")
+UNTOUCHED = {
+    "renderer": "texture",
+    "background": "white",
+    "person": "largest",
+    "driver_person": "largest",
+    "frames": [0, FRAMES],
+    "frame_rate": "15",
+    "window": None,
+}
+CONTROLS = "[...document.querySelectorAll('button, input, select, [role=slider], summary')]"
+PIXEL = """(image, [x, y]) => {
+  const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
+  const context = canvas.getContext("2d");
+  context.drawImage(image, 0, 0);
+  return [...context.getImageData(x, y, 1, 1).data.slice(0, 3)];
+}"""
+
+
+class Preview:
+    """A running `mt preview`."""
+
+    def __init__(self, link: str, folder: Path) -> None:
+        self.link, self.folder = link, folder
+        self.address = urlsplit(link)
+
+    def ask(
+        self, method: str, path: str, body: Any = None, **headers: str
+    ) -> tuple[int, dict[str, str], bytes]:
+        """Send a request to a path of the server; returns status, headers and body."""
+        assert self.address.hostname is not None
+        connection = http.client.HTTPConnection(
+            self.address.hostname, self.address.port, timeout=20
+        )
+        if body is not None:
+            headers = {"Content-Type": "application/json", **headers}
+        try:
+            connection.request(method, path, None if body is None else json.dumps(body), headers)
+            answer = connection.getresponse()
+            return answer.status, dict(answer.getheaders()), answer.read()
+        finally:
+            connection.close()
+
+    def post(self, path: str, body: Any, **headers: str) -> int:
+        return self.ask("POST", self.address.path + path, body, **headers)[0]
+
+
+@contextmanager
+def previewing(folder: Path, *arguments: object) -> Iterator[Preview]:
+    """Run `mt preview`; it has to end by itself when it is interrupted."""
+    command = [sys.executable, "-m", "motion_transfer", "preview", "--no-open", "--port", "0"]
+    process = subprocess.Popen(
+        [*command, *map(str, arguments)], cwd=folder, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    watchdog = threading.Timer(START_SECONDS, process.kill)  # a line that never comes
+    watchdog.start()
+    try:
+        lines = iter(process.stdout.readline, "")
+        found = next(filter(None, (re.search(r"http://\S+", line) for line in lines)), None)
+        watchdog.cancel()
+        assert found is not None, "no link was printed"
+        yield Preview(found[0], folder)
+    finally:
+        watchdog.cancel()
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(30)
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def preview(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Preview]:
+    source, driver = DEMO / "source.png", DEMO / "driver.mkv"
+    folder = tmp_path_factory.mktemp("preview")
+    inputs = ("--source", source, "--driver", driver, "-o", "out.webm")
+    with previewing(folder, *inputs, "--renderer", "texture") as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as player:
+        browser = player.chromium.launch(
+            executable_path=CHROMIUM, args=["--headless", "--no-sandbox", "--disable-gpu"]
+        )
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
+    """A page that shows its first picture; what it complains about fails the test."""
+    pages, complaints = [], []
+
+    def open_link(link: str, **how: Any) -> Any:
+        page = browser.new_page(**how)
+        pages.append(page)
+        page.set_default_timeout(15_000)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda message: complain(message))
+        page.goto(link)
+        page.wait_for_selector("#over[data-view=result]", timeout=30_000)
+        return page
+
+    def complain(message: Any) -> None:
+        # A frame that cannot be shown is answered by 422, which the browser notes by itself.
+        if message.type == "error" and not re.search(r"status of (422|409)", message.text):
+            complaints.append(message.text)
+
+    yield open_link
+    for page in pages:
+        page.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def page(preview: Preview, open_page: Callable[..., Any]) -> Any:
+    assert preview.post("options", UNTOUCHED) == 200
+    return open_page(preview.link, viewport={"width": 1280, "height": 800})
+
+
+def shows(page: Any, frame: int, view: str = "result", layer: str = "over") -> None:
+    """Wait until the picture of a frame is there, and is a picture."""
+    image = page.locator(f"#{layer}")
+    expect(image).to_have_attribute("data-frame", str(frame))
+    expect(image).to_have_attribute("data-view", view)
+    expect(image).to_be_visible()
+    until(lambda: image.evaluate("image => image.complete && image.naturalWidth > 0"))
+
+
+def pixel(page: Any, x: int, y: int) -> list[int]:
+    """Colour of the picture's own pixel."""
+    image = page.locator("#over")
+    until(lambda: image.evaluate("image => image.complete"))
+    return image.evaluate(PIXEL, [x, y])
+
+
+def until(holds: Callable[[], bool], seconds: float = 15) -> None:
+    """Wait for what no locator can tell; the page's policy lets no script look out for it."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.03)
+
+
+def shown_frame(page: Any) -> int:
+    return int(page.locator("#over").get_attribute("data-frame"))
+
+
+def drag(page: Any, start: tuple[float, float], stop: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*((a + b) / 2 for a, b in zip(start, stop, strict=True)))
+    page.mouse.move(*stop)
+    page.mouse.up()
+
+
+def press(page: Any, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def test_the_page_says_what_it_shows(page) -> None:
+    shows(page, 0)
+    expect(page.locator("#subject")).to_have_text("source.png in the motion of driver.mkv")
+    expect(page.get_by_label("The same as a command")).to_contain_text("--renderer texture")
+
+
+def test_dragging_the_slider_changes_the_frame(page) -> None:
+    slider = page.get_by_role("slider", name="Driver frame")
+    box = slider.bounding_box()
+    before = page.locator("#over").get_attribute("src")
+    middle = box["y"] + box["height"] / 2
+    drag(page, (box["x"] + 8, middle), (box["x"] + box["width"] / 2, middle))
+    frame = int(slider.input_value())
+    assert abs(frame - FRAMES / 2) <= 1
+    shows(page, frame)
+    assert page.locator("#over").get_attribute("src") != before
+    assert page.get_by_label("Frame", exact=True).input_value() == str(frame)
+
+
+def test_keys_step_jump_and_set_in_and_out(page) -> None:
+    for key, frame in [
+        ("ArrowRight", 1),
+        ("Shift+ArrowRight", 11),
+        ("ArrowLeft", 10),
+        ("End", FRAMES - 1),
+        ("Shift+ArrowLeft", FRAMES - 11),
+        ("Home", 0),
+    ]:
+        page.keyboard.press(key)
+        shows(page, frame)
+    page.get_by_role("slider", name="Driver frame").focus()
+    page.keyboard.press("Shift+ArrowRight")
+    shows(page, 10)
+    page.keyboard.press("i")
+    expect(page.locator(".mark.chosen")).to_have_attribute("data-range", f"10:{FRAMES}")
+    page.get_by_label("Frame", exact=True).fill("50")
+    shows(page, 50)
+    press(page, "Set out here")
+    expect(page.locator(".mark.chosen")).to_have_attribute("data-range", "10:51")
+    expect(page.get_by_label("Out", exact=True)).to_have_value("50")
+    expect(page.get_by_label("The same as a command")).to_contain_text("--frames 10:51")
+
+
+def test_playing_moves_on_in_time_and_stops(page) -> None:
+    page.keyboard.press("Space")
+    until(lambda: shown_frame(page) >= 8)
+    assert page.get_by_role("button", name="Pause").is_visible()
+    first = int(page.get_by_label("Frame", exact=True).input_value())
+    page.wait_for_timeout(1000)
+    passed = int(page.get_by_label("Frame", exact=True).input_value()) - first
+    assert 11 <= passed <= 19, "15 frames a second"
+    page.keyboard.press("Space")
+    frame = int(page.get_by_label("Frame", exact=True).input_value())
+    shows(page, frame)
+    page.wait_for_timeout(300)
+    assert int(page.get_by_label("Frame", exact=True).input_value()) == frame
+
+
+def test_playing_goes_from_out_to_in(page, preview) -> None:
+    assert preview.post("options", {"frames": [20, 24]}) == 200
+    expect(page.locator(".mark.chosen")).to_have_attribute("data-range", "20:24")
+    page.get_by_label("Frame", exact=True).fill("22")
+    press(page, "Play")
+    until(lambda: shown_frame(page) == 20)
+    press(page, "Pause")
+
+
+def test_the_wipe_is_moved_by_mouse_and_keys(page) -> None:
+    press(page, "Compare")
+    wipe = page.get_by_role("slider", name="Wipe")
+    shows(page, 0, "iuv", "base")
+    expect(wipe).to_have_attribute("aria-valuenow", "50")
+    box = page.locator("#frame").bounding_box()
+    middle = box["y"] + box["height"] / 2
+    drag(
+        page,
+        (box["x"] + box["width"] / 2, middle),
+        (box["x"] + box["width"] / 4, middle),
+    )
+    expect(wipe).to_have_attribute("aria-valuenow", "25")
+    expect(page.locator("#over")).to_have_css("clip-path", "inset(0px 0px 0px 25%)")
+    wipe.press("Shift+ArrowRight")
+    expect(wipe).to_have_attribute("aria-valuenow", "35")
+    wipe.press("Home")
+    expect(wipe).to_have_attribute("aria-valuenow", "0")
+    shows(page, 0)  # the arrow keys were the wipe's, not the frames'
+
+
+def test_each_view_shows_its_own_picture(page, preview) -> None:
+    assert preview.post("options", {"renderer": "nhrr"}) == 200
+    page.get_by_label("Frame", exact=True).fill("40")
+    shown = set()
+    for name, view in zip(
+        VIEWS, ("result", "result", "iuv", "source", "texture", "map", "features"), strict=True
+    ):
+        press(page, name)
+        expect(page.get_by_role("button", name=name, exact=True)).to_have_attribute(
+            "aria-pressed", "true"
+        )
+        shows(page, 40, view)
+        assert page.get_by_alt_text(re.compile(".+")).count() >= 1
+        shown.add(page.locator("#over").get_attribute("src"))
+    assert len(shown) >= len(VIEWS) - 1
+
+
+def test_a_draft_gives_way_to_the_network(page) -> None:
+    badge = page.locator("#quality")
+    expect(badge).to_have_text("draft")
+    page.get_by_label("Frame", exact=True).fill("33")
+    shows(page, 33)
+    draft = page.locator("#over").get_attribute("src")
+    page.get_by_label("Renderer").select_option("nhrr")
+    expect(badge).to_have_text("network")
+    shows(page, 33)
+    assert page.locator("#over").get_attribute("src") != draft
+    expect(page.locator(".mark.cached[data-range='33:34']")).to_have_count(1)
+
+
+def test_a_background_shows_at_once(page) -> None:
+    assert pixel(page, 5, 5) == pytest.approx([255, 255, 255], abs=4)
+    page.get_by_label("Background", exact=True).select_option("black")
+    until(lambda: max(pixel(page, 5, 5)) < 8)
+    page.get_by_label("Background", exact=True).select_option("custom")
+    page.get_by_label("Background colour").fill("#20c040")
+    until(lambda: pixel(page, 5, 5) == pytest.approx([0x20, 0xC0, 0x40], abs=12))
+    expect(page.get_by_label("The same as a command")).to_contain_text("#20c040")
+
+
+def test_a_value_that_cannot_be_is_refused_in_words(page) -> None:
+    rate = page.get_by_label("Frames/s")
+    rate.fill("fast")
+    rate.press("Enter")
+    expect(page.locator("#fault-frame_rate")).to_contain_text("fast")
+    expect(rate).to_have_attribute("aria-invalid", "true")
+    rate.fill("25")
+    rate.press("Enter")
+    expect(page.locator("#fault-frame_rate")).to_have_count(0)
+    expect(page.locator("#length")).to_have_text("120 frames, 4.80 s")
+
+
+def test_a_window_is_drawn_typed_and_given_back(page) -> None:
+    expect(page.locator("#outline")).to_be_visible()
+    press(page, "Draw a window")
+    box = page.locator("#frame").bounding_box()
+    scale = box["width"] / SIDE_PX
+    drag(
+        page,
+        (box["x"] + 80 * scale, box["y"] + 60 * scale),
+        (box["x"] + 280 * scale, box["y"] + 200 * scale),
+    )
+    outline = page.locator("#outline .line")
+    for name, value in {"x": 80, "y": 60, "width": 200}.items():
+        expect(outline).to_have_attribute(name, re.compile(rf"^({value - 1}|{value}|{value + 1})$"))
+    expect(page.locator("#window-words")).to_contain_text("by hand")
+    side = page.get_by_label("Side")
+    side.fill("160")
+    side.press("Enter")
+    expect(outline).to_have_attribute("width", "160")
+    expect(page.get_by_label("The same as a command")).to_contain_text(",160")
+    press(page, "Automatic")
+    expect(page.locator("#window-words")).to_contain_text("Automatic")
+    expect(outline).not_to_have_attribute("width", "160")
+
+
+def test_the_video_is_rendered_and_plays(page, preview) -> None:
+    (preview.folder / "out.webm").unlink(missing_ok=True)
+    assert preview.post("options", {"frames": [0, 30]}) == 200
+    expect(page.locator("#length")).to_contain_text("30 frames")
+    press(page, "Render")
+    film = page.locator("#film")
+    expect(film).to_be_visible(timeout=30_000)
+    until(lambda: film.evaluate("film => film.readyState") >= 3)
+    assert film.evaluate("film => film.duration") == pytest.approx(2, abs=0.1)
+    until(lambda: film.evaluate("film => film.currentTime") > 0.2)
+    press(page, "Close")
+    expect(film).not_to_be_visible()
+    expect(page.locator("#render-words")).to_contain_text("Wrote")
+    with av.open(str(preview.folder / "out.webm")) as container:
+        assert sum(1 for _ in container.decode(video=0)) == 30
+
+
+def test_an_output_is_replaced_only_if_somebody_says_so(page, preview) -> None:
+    output = preview.folder / "out.webm"
+    output.write_bytes(b"mine")
+    press(page, "Render")
+    expect(page.get_by_role("dialog")).to_contain_text("out.webm")
+    press(page, "Keep it")
+    expect(page.get_by_role("dialog")).to_have_count(0)
+    assert output.read_bytes() == b"mine"
+
+
+def test_a_run_is_stopped(page, preview) -> None:
+    (preview.folder / "out.webm").unlink(missing_ok=True)
+    assert preview.post("options", {"renderer": "nhrr"}) == 200
+    expect(page.get_by_label("Renderer")).to_have_value("nhrr")
+    press(page, "Render")
+    expect(page.get_by_role("progressbar", name="Rendering")).to_be_visible()
+    press(page, "Stop")
+    expect(page.locator("#render-words")).to_contain_text("topped")
+    expect(page.get_by_role("button", name="Render", exact=True)).to_be_enabled()
+    assert not (preview.folder / "out.webm").exists()
+
+
+def test_a_saved_job_is_what_a_batch_runs(page, preview, mt) -> None:
+    (preview.folder / "out.webm").unlink(missing_ok=True)
+    (preview.folder / "preview.yaml").unlink(missing_ok=True)
+    assert preview.post("options", {"frames": [5, 9], "background": "black"}) == 200
+    expect(page.locator("#length")).to_contain_text("4 frames")
+    press(page, "Save job")
+    expect(page.locator("#saved-words")).to_contain_text("preview.yaml")
+    expect(page.get_by_label("The saved job")).to_contain_text("background: black")
+    press(page, "Close")
+    batch = mt("batch", "run", preview.folder / "preview.yaml")
+    assert batch.code == 0, batch.err
+    with av.open(str(preview.folder / "out.webm")) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(frames) == 4
+    assert frames[0][5, 5].max() < 20
+
+
+def test_the_command_is_copied(page, preview) -> None:
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    press(page, "Copy command")
+    expect(page.get_by_role("button", name="Copied")).to_be_visible()
+    command = page.evaluate("navigator.clipboard.readText()")
+    assert command.startswith("mt run --source ")
+    assert command == page.get_by_label("The same as a command").text_content()
+
+
+def test_a_broken_frame_says_so_and_the_others_work(tmp_path, open_page, browser) -> None:
+    driver = tmp_path / "frames"
+    driver.mkdir()
+    with av.open(str(DEMO / "driver.mkv")) as container:
+        for index, frame in zip(range(8), container.decode(video=0), strict=False):
+            pixels = frame.to_ndarray(format="rgb24")
+            Image.fromarray(pixels).save(driver / f"{index:03d}_IUV.png")
+    (driver / "003_IUV.png").write_bytes(b"not a picture")
+    inputs = ("--source", DEMO / "source.png", "--driver", driver, "--renderer", "texture")
+    with previewing(tmp_path, *inputs) as running:
+        page = open_page(running.link)
+        expect(page.locator(".mark.broken")).to_have_attribute("data-range", "3:4")
+        press(page, "Broken 3: go there")
+        expect(page.locator("#trouble")).to_be_visible()
+        expect(page.locator("#trouble")).to_contain_text("003_IUV.png")
+        expect(page.locator("#over")).not_to_be_visible()
+        page.keyboard.press("ArrowRight")
+        shows(page, 4)
+        expect(page.locator("#trouble")).not_to_be_visible()
+    # The server is gone: the page has to say so rather than stand still.
+    expect(page.get_by_role("alert")).to_contain_text("does not answer")
+    page.goto("about:blank")  # else it goes on asking, which the browser notes as errors
+
+
+def test_without_the_token_nothing_is_told(preview) -> None:
+    for path in ("/", "/events", "/wrong/", "/wrong/events", "/wrong/frame/0/iuv", "/page.js"):
+        status, _, body = preview.ask("GET", path)
+        assert status in (403, 404)
+        for secret in (preview.address.path.strip("/"), str(DEMO), "source.png"):
+            assert secret.encode() not in body
+    assert preview.ask("GET", preview.address.path)[0] == 200
+
+
+def test_other_hosts_and_origins_are_refused(preview) -> None:
+    path = preview.address.path
+    assert preview.ask("GET", path, Host="evil.example")[0] in (400, 403, 421)
+    for origin in ("http://evil.example", "null", f"https://{preview.address.netloc}"):
+        assert preview.post("options", {"background": "black"}, Origin=origin) == 403
+        assert preview.post("render", {"replace": True}, Origin=origin) == 403
+    assert preview.post("options", {}, **{"Content-Type": "text/plain"}) in (403, 415)
+    assert preview.post("options", {}, Origin=f"http://{preview.address.netloc}") == 200
+
+
+def test_the_page_loads_nothing_from_elsewhere(preview) -> None:
+    _, headers, _ = preview.ask("GET", preview.address.path)
+    policy = {name.lower(): value for name, value in headers.items()}["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert not re.search(r"https?:|\*|unsafe", policy)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_phone_shows_all_of_it_without_scrolling_sideways(
+    preview, open_page, scheme: str
+) -> None:
+    phone = {"width": 390, "height": 844}
+    page = open_page(preview.link, viewport=phone, color_scheme=scheme)
+    for name in VIEWS[:3]:
+        press(page, name)
+        page.wait_for_timeout(100)
+        assert page.evaluate("document.documentElement.scrollWidth") <= phone["width"]
+    for control in page.locator("button:visible, input:visible, select:visible").all():
+        control.scroll_into_view_if_needed()
+        box = control.bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= phone["width"]
+
+
+def test_every_control_has_a_name_and_is_reached_by_tab(page) -> None:
+    press(page, "Compare")
+    named = sum(
+        page.get_by_role(role, name=re.compile(r"\S")).count()
+        for role in ("button", "slider", "spinbutton", "combobox", "checkbox")
+    )
+    anonymous = sum(
+        page.get_by_role(role, name=re.compile(r"^\s*$")).count()
+        for role in ("button", "slider", "spinbutton", "combobox", "checkbox")
+    )
+    controls = page.locator("button:visible, input:visible, select:visible, [role=slider]:visible")
+    assert (named, anonymous) == (controls.count(), 0)
+    wanted = page.evaluate(f"{CONTROLS}.filter(e => e.checkVisibility() && !e.disabled).length")
+    page.evaluate("document.activeElement.blur()")
+    reached = set()
+    for _ in range(wanted + 12):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate(f"{CONTROLS}.indexOf(document.activeElement)"))
+    assert len(reached - {-1}) == wanted
