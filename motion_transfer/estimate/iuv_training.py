@@ -145,7 +145,10 @@ class IuvTraining:
         temporary = self.run / ".state.tmp"
         torch.save(state, temporary)
         publish(temporary, self.run / "state.pt")
-        notes = {"trained-on": f"{len(self.files)} photos of synthetic people, {self.step} steps"}
+        notes = {
+            "licence": "CC0-1.0",
+            "trained-on": f"{len(self.files)} photos of synthetic people, {self.step} steps",
+        }
         temporary = self.run / ".weights.tmp"
         save_weights(temporary, self.averaged, notes)
         publish(temporary, self.run / "weights.safetensors")

@@ -7,6 +7,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -47,16 +48,17 @@ class Session:
 
     def __init__(self, options: RenderOptions, job_file: Path) -> None:
         self.options = options
+        self._weights = options.weights
         self.job_file = job_file
         self.revision = 0
         self.look: DriverLook | None = None
         self.plans: FramePlans | None = None
-        self.error: str | None = None
         self.source: Source | None = None
         self.source_people = 0
         self.rendering = Rendering(self._touch)
         self.pictures = Pictures()
         self._notices: list[str] = []
+        self._errors: dict[str, str] = {}
         self._work: dict[str, Any] | None = None
         self._queue, self._kept = DrawQueue(), Kept(KEPT_BYTES)
         self._lock = threading.RLock()
@@ -75,19 +77,29 @@ class Session:
         self._opener.join()
         self._folder.cleanup()
 
+    @property
+    def error(self) -> str | None:
+        """Why there is nothing to show; None where there is."""
+        return "; ".join(self._errors.values()) or None
+
     def wait_for_plan(self) -> None:
         """Until the driver has been looked through. Raises: InputError if it cannot be used."""
         self._opener.join()
-        if self.error is not None:
-            raise InputError(self.error)
+        if error := self.error:
+            raise InputError(error)
 
     # pictures
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether the driver's own pictures can be shown."""
+        return self._proxies is not None
 
     @property
     def key(self) -> str:
         """Changes whenever a picture would."""
         o, plans = self.options, self.plans
-        drawn = (o.renderer, o.background, o.person, o.driver_person, self._proxies is not None)
+        drawn = (o.renderer, o.background, o.person, o.driver_person)
         planned = plans and (plans.shots, plans.exact, plans.chosen)
         return hashlib.sha256(repr((drawn, planned)).encode()).hexdigest()[:12]
 
@@ -178,19 +190,22 @@ class Session:
             raise InputError(f"option {unknown[0]!r}; here one can set {', '.join(CHANGEABLE)}")
         entries = {entry.name: entry for entry in list_options(RenderOptions)}
         parsed = {name: parse_word(entries[name], value) for name, value in words.items()}
-        if parsed.get("renderer") == "texture":
-            parsed["weights"] = None
+        if "renderer" in parsed:  # weights go with the network, and come back with it
+            parsed["weights"] = None if parsed["renderer"] == "texture" else self._weights
         changed = replace(self.options, **parsed)
         if "person" in words:
             self.source = self._queue.ask(lambda: self.pictures.source(changed)).result()
+            self._errors.pop("source", None)
         if self.look is not None and self.look.pictures and "driver_person" in words:
             raise InputError(
                 "whom to follow in raw pictures is decided when they are read; start again with"
                 f" --driver-person {changed.driver_person}"
             )
-        plans = plan_frames(self.look, changed) if self.look is not None else None
-        with self._lock:
-            self.options, self.plans = changed, plans
+        with self._lock:  # the driver may have been looked through meanwhile
+            if self.look is not None:
+                self.plans = plan_frames(self.look, changed)
+            self.options = changed
+            self._errors.pop("plan", None)
         self._touch()
 
     # results
@@ -226,30 +241,32 @@ class Session:
 
     def _open(self) -> None:
         try:
-            look = open_look(self.options, Path(self._folder.name), self._hear)
-            with self._lock:
-                self.look = look
-                self.plans = plan_frames(look, self.options)
+            self.look = look = open_look(self.options, Path(self._folder.name), self._hear)
+            with suppress(InputError):  # a few frames may show nobody where others do
+                self._plan()
             self._hear(Stage("scan", look.frame_count))
             look.look_through(self._closing, self._looked)
             if self._closing.is_set():
                 return
-            plans = plan_frames(look, self.options)
-            with self._lock:
-                self.plans, self._work = plans, None
-            self._touch()
+            try:
+                self._plan()
+            except InputError as error:
+                self._errors["plan"] = str(error)
             if look.pictures is not None:
-                proxies = Proxies.make(
-                    self.options.driver, Path(self._folder.name) / "proxies", self._closing
-                )
-                with self._lock:
-                    self._proxies = proxies
+                folder = Path(self._folder.name) / "proxies"
+                self._proxies = Proxies.make(self.options.driver, folder, self._closing)
         except _ClosingError:
             return
         except Exception as error:  # the page has to say so, whatever it was
-            self.error = _in_words(error)
-        with self._lock:
-            self._work = None
+            self._errors["driver"] = _in_words(error)
+        self._work = None
+        self._touch()
+
+    def _plan(self) -> None:
+        """Plan from what is known. Raises: InputError."""
+        assert self.look is not None
+        with self._lock:  # options may be changing
+            self.plans = plan_frames(self.look, self.options)
         self._touch()
 
     def _find_source(self) -> None:
@@ -257,7 +274,7 @@ class Session:
             self.source = self.pictures.source(self.options)
             self.source_people = count_people(self.source, self.options)
         except Exception as error:  # the page has to say so, whatever it was
-            self.error = _in_words(error)
+            self._errors["source"] = _in_words(error)
         self._touch()
 
     def _looked(self, count: int) -> None:

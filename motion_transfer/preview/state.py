@@ -75,7 +75,7 @@ def _driver(session: Session) -> dict[str, Any] | None:
         "width": look.reader.width,
         "height": look.reader.height,
         "frame_rate": str(look.frame_rate or DEFAULT_RATE),
-        "pictures": look.pictures is not None,
+        "pictures": session.has_pictures,
     }
 
 

@@ -167,6 +167,16 @@ def test_a_draft_is_drawn_without_the_network(
     assert session.ask_frame(3, "result", session.key).result() == draft
 
 
+def test_weights_come_back_with_the_network(
+    options: RenderOptions, open_session, checkpoint: Path
+) -> None:
+    session = open_session(replace(options, renderer="nhrr", weights=checkpoint))
+    session.change({"renderer": "texture"})
+    assert session.options.weights is None
+    session.change({"renderer": "nhrr"})
+    assert session.options.weights == checkpoint
+
+
 def test_an_option_changes_the_pictures_and_their_key(options: RenderOptions, open_session) -> None:
     session = open_session(options)
     session.wait_for_plan()
@@ -282,6 +292,25 @@ def test_a_driver_that_is_none_is_said_in_words(options: RenderOptions, open_ses
     state = session.state()
     assert "does not exist" in state["error"]
     assert state["driver"] is None
+
+
+def test_an_error_goes_when_its_cause_does(options: RenderOptions, open_session) -> None:
+    session = open_session(replace(options, driver_person="5"))
+    with pytest.raises(InputError, match="person 5"):
+        session.wait_for_plan()
+    session.change({"driver_person": "largest"})
+    assert session.state()["error"] is None
+    assert picture(session.ask_frame(3, "result", session.key).result()).shape == (96, 64, 3)
+
+
+def test_somebody_only_between_the_sampled_frames_is_found(studio, options, open_session) -> None:
+    frames = np.zeros((200, 96, 64, 3), np.uint8)
+    frames[3:8] = studio.iuv()
+    session = open_session(replace(options, driver=studio.array(frames)))
+    session.wait_for_plan()
+    state = session.state()
+    assert state["error"] is None
+    assert state["missing"] == ((0, 3), (8, 200))
 
 
 def test_a_source_that_is_none_is_said_in_words(options: RenderOptions, open_session) -> None:
