@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import torch
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Float32, Int, UInt8
 from torch import Tensor
-from torch.nn import functional as F
 
 from motion_transfer.estimate.interface import Box
 from motion_transfer.estimate.iuv_network import IuvLogits
@@ -24,10 +24,9 @@ def paint_iuv(logits: IuvLogits, window: Box, box: Box) -> UInt8[np.ndarray, "h 
     the window.
     """
     size = min(window.width, FINEST)
-    enlarged = F.interpolate(logits.parts, (size, size), mode="bilinear", align_corners=False)
-    parts = enlarged[0].argmax(0)
-    rows, columns = torch.nonzero(parts, as_tuple=True)
-    which = parts[rows, columns]
+    parts = enlarge_parts(logits.parts[0].numpy(), size)
+    rows, columns = torch.nonzero(torch.from_numpy(parts), as_tuple=True)
+    which = torch.from_numpy(parts)[rows, columns].long()
     # a border of nobody around it, for pixels beyond the window
     iuv = np.zeros((size + 2, size + 2, 3), np.uint8)
     uv = interpolate_within(logits.uv[0], which - 1, rows, columns, size)
@@ -41,6 +40,23 @@ def paint_iuv(logits: IuvLogits, window: Box, box: Box) -> UInt8[np.ndarray, "h 
         )
     ]
     return iuv[nearest[0].clip(0, size + 1)[:, None], nearest[1].clip(0, size + 1)]
+
+
+def enlarge_parts(
+    logits: Float32[np.ndarray, "25 h w"], size: int
+) -> UInt8[np.ndarray, "size size"]:
+    """The part with the highest logit at each pixel of a size x size picture, bilinear between.
+
+    One part after the other: faster than an argmax over a stack of enlarged ones, which is read
+    across its planes, and no such stack is made.
+    """
+    best = cv2.resize(logits[0], (size, size), interpolation=cv2.INTER_LINEAR)
+    parts = np.zeros((size, size), np.uint8)
+    for part, plane in enumerate(logits[1:], 1):
+        enlarged = cv2.resize(plane, (size, size), interpolation=cv2.INTER_LINEAR)
+        np.copyto(parts, np.uint8(part), where=enlarged > best)
+        cv2.max(best, enlarged, dst=best)
+    return parts
 
 
 def interpolate_within(
