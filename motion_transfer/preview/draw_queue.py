@@ -1,10 +1,9 @@
-"""Pictures on demand: one thread draws what is looked at, the nearest first, and keeps it."""
+"""Pictures on demand: one thread draws what is looked at, the nearest first."""
 
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
@@ -23,30 +22,6 @@ class _Task:
     place: int
     draft: bool
     call: Callable[[], Any]
-
-
-class Kept:
-    """The results that were asked for last, up to a number of bytes."""
-
-    def __init__(self, most_bytes: int) -> None:
-        self._most = most_bytes
-        self._held: OrderedDict[Hashable, bytes] = OrderedDict()
-        self._bytes = 0
-        self._lock = threading.Lock()
-
-    def get(self, name: Hashable) -> bytes | None:
-        with self._lock:
-            if name in self._held:
-                self._held.move_to_end(name)
-            return self._held.get(name)
-
-    def put(self, name: Hashable, data: bytes) -> None:
-        with self._lock:
-            self._bytes += len(data) - len(self._held.pop(name, b""))
-            self._held[name] = data
-            while self._bytes > self._most:
-                _, dropped = self._held.popitem(last=False)
-                self._bytes -= len(dropped)
 
 
 class DrawQueue:

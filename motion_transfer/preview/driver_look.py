@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,7 @@ from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_stream import IuvReader, open_reader
+from motion_transfer.preview.kept import Kept
 from motion_transfer.render.events import Listener
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.person import People, find_people, take_as_one
@@ -21,6 +23,8 @@ from motion_transfer.render.plan import SeenFrame, digest_of_iuv
 from motion_transfer.render.prepare import DriverFile, are_pictures, open_iuv_driver
 
 BLOCK_FRAMES = 16
+KEPT_BYTES = 256 * 2**20
+"""Of decoded frames: to jump into a video is to decode from its last key frame."""
 
 
 @dataclass
@@ -41,6 +45,7 @@ class DriverLook:
     seen: dict[int, SeenFrame] = field(default_factory=dict)
     broken: dict[int, str] = field(default_factory=dict)
     most_people: int = 0
+    _kept: Kept[np.ndarray] = field(default_factory=lambda: Kept(KEPT_BYTES, lambda a: a.nbytes))
 
     @property
     def frame_count(self) -> int:
@@ -52,12 +57,24 @@ class DriverLook:
         return len({*self.seen, *self.broken}) == self.frame_count
 
     def read(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
-        """One frame's IUV. Raises: InputError naming the frame that is broken."""
+        """One frame's IUV, not to be written to. Raises: InputError naming the broken frame."""
+        kept = self._kept.get(index)
+        if kept is not None:
+            return kept
+        # whoever asks for the next one, plays: decoding then goes on instead of beginning anew
+        playing = self._kept.get(index - 1) is not None
+        stop = min(index + (BLOCK_FRAMES if playing else 1), self.frame_count)
+        frames = self.reader.read(index, stop)
         try:
-            return next(iter(self.reader.read(index, index + 1)))
+            wanted = next(frames)
         except InputError as error:
             self.broken[index] = str(error)
             raise
+        self._kept.put(index, wanted)
+        with suppress(InputError):  # who asks for those will hear of it
+            for number, iuv in enumerate(frames, index + 1):
+                self._kept.put(number, iuv)
+        return wanted
 
     def people_in(self, iuv: UInt8[np.ndarray, "H W 3"]) -> People:
         """Everybody in a frame."""
@@ -93,6 +110,7 @@ class DriverLook:
     def _note(self, index: int, iuv: UInt8[np.ndarray, "H W 3"]) -> None:
         people = self.people_in(iuv)
         self.most_people = max(self.most_people, len(people.persons))
+        self._kept.put(index, iuv)
         self.seen[index] = SeenFrame(people, digest_of_iuv(iuv))
 
 

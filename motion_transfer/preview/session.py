@@ -19,9 +19,10 @@ from jaxtyping import UInt8
 from motion_transfer.errors import InputError, MotionTransferError
 from motion_transfer.media.image import encode_jpeg, encode_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
-from motion_transfer.preview.draw_queue import DrawQueue, Kept, StaleError
+from motion_transfer.preview.draw_queue import DrawQueue, StaleError
 from motion_transfer.preview.driver_look import DriverLook, open_look
 from motion_transfer.preview.frame_plans import FramePlans, plan_frames
+from motion_transfer.preview.kept import Kept
 from motion_transfer.preview.pictures import Pictures, count_people
 from motion_transfer.preview.proxies import Proxies
 from motion_transfer.preview.rendering import Rendering
@@ -60,7 +61,7 @@ class Session:
         self._notices: list[str] = []
         self._errors: dict[str, str] = {}
         self._work: dict[str, Any] | None = None
-        self._queue, self._kept = DrawQueue(), Kept(KEPT_BYTES)
+        self._queue, self._kept = DrawQueue(), Kept[bytes](KEPT_BYTES, len)
         self._lock = threading.RLock()
         self._closing = threading.Event()
         self._folder = tempfile.TemporaryDirectory(prefix="mt-preview-")

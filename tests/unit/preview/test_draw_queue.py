@@ -1,4 +1,4 @@
-"""What is drawn when, and what is kept."""
+"""What is drawn when."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from motion_transfer.preview.draw_queue import DrawQueue, Kept
+from motion_transfer.preview.draw_queue import DrawQueue
 
 
 @pytest.fixture
@@ -72,26 +72,3 @@ def test_closing_cancels_what_waits() -> None:
     queue.close()
     assert waiting.cancelled()
     assert queue.ask(lambda: None).cancelled()
-
-
-def test_what_was_used_longest_ago_makes_room() -> None:
-    kept = Kept(10)
-    kept.put("a", b"1234")
-    kept.put("b", b"1234")
-    assert kept.get("a") == b"1234"
-    kept.put("c", b"1234")
-    assert (kept.get("a"), kept.get("b"), kept.get("c")) == (b"1234", None, b"1234")
-
-
-def test_a_name_put_again_counts_once() -> None:
-    kept = Kept(10)
-    for _ in range(5):
-        kept.put("a", b"123456")
-    kept.put("b", b"1234")
-    assert kept.get("a") is not None
-
-
-def test_what_is_larger_than_the_room_is_not_kept() -> None:
-    kept = Kept(3)
-    kept.put("a", b"1234")
-    assert kept.get("a") is None

@@ -129,6 +129,17 @@ def test_a_broken_frame_is_marked_and_the_others_are_shown(
     assert picture(session.ask_frame(8, "result", session.key).result()).shape == (96, 64, 3)
 
 
+def test_a_video_can_be_read_in_any_order(studio, options: RenderOptions, monkeypatch) -> None:
+    walk = studio.walk(30)
+    look = open_look(replace(options, driver=studio.video(walk)), options.output.parent, ignore)
+    opened = []
+    read = look.reader.read
+    monkeypatch.setattr(look.reader, "read", lambda *ends: opened.append(ends) or read(*ends))
+    for index in (20, 3, 4, 5, 6, 20, 29, 0):
+        assert np.array_equal(look.read(index), walk[index])
+    assert opened == [(20, 21), (3, 4), (4, 20), (29, 30), (0, 1)]
+
+
 @pytest.mark.parametrize("view", ["result", "iuv"])
 def test_views_of_a_frame(options: RenderOptions, open_session, view: str) -> None:
     session = open_session(options)
