@@ -3,11 +3,13 @@
 `docs/demo.png`: the demo's photo, and its motion over the result at six moments.
 `docs/how_it_works.png`: what each step of the method hands to the next.
 `docs/people.jpg`: synthetic people with their IUV.
+`docs/astronaut.jpg`: a photo alone, its estimated IUV and texture, and frames (needs the models).
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from threading import Event
 
 import cv2
 import numpy as np
@@ -16,7 +18,11 @@ from PIL import Image, ImageDraw, ImageFont
 from motion_transfer.media.image import read_photo
 from motion_transfer.media.iuv_stream import open_reader, open_stream
 from motion_transfer.people import PeopleStream
+from motion_transfer.preview.driver_look import open_look
+from motion_transfer.preview.frame_plans import plan_frames
+from motion_transfer.preview.pictures import Pictures
 from motion_transfer.render.compose import colour_iuv, paste
+from motion_transfer.render.events import ignore
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.recipe import Recipe
 from motion_transfer.render.source import prepare_source
@@ -25,6 +31,7 @@ from motion_transfer.render.window import Window
 ROOT = Path(__file__).parents[1]
 DEMO = ROOT / "motion_transfer" / "demo"
 MOMENTS = (0, 24, 40, 56, 72, 104)
+WAVING = (0, 10, 20)
 PEOPLE_SEED, PEOPLE_ROWS, PEOPLE_COLUMNS = 3, 6, 4
 PANEL_PX = 240
 LABEL_PX = 44
@@ -63,6 +70,7 @@ def main() -> None:
     save(ROOT / "docs" / "demo.png", np.hstack([photo, np.vstack(rows)]))
 
     save(ROOT / "docs" / "people.jpg", people_sheet())
+    save(ROOT / "docs" / "astronaut.jpg", photo_alone())
 
     partial = np.where(source.visibility[0, 0, ..., None] > 0, picture(source.texture), 255)
     save(
@@ -77,6 +85,22 @@ def main() -> None:
                 panel(results[1], "frame"),
             ]
         ),
+    )
+
+
+def photo_alone() -> np.ndarray:
+    """What `mt demo --photo-alone` goes through."""
+    options = RenderOptions(
+        source=DEMO / "astronaut.jpg", driver=DEMO / "wave.mkv", output=Path("unused.mp4")
+    )
+    look = open_look(options, ROOT, ignore)
+    look.look_through(Event(), lambda _count: None)
+    plans, pictures = plan_frames(look, options), Pictures()
+    source = pictures.source(options)
+    panels = [source.photo.rgb, colour_iuv(source.iuv), pictures.texture(options)]
+    panels += [pictures.result(options, look, plans, moment) for moment in WAVING]
+    return np.hstack(
+        [cv2.resize(each, (PANEL_PX,) * 2, interpolation=cv2.INTER_AREA) for each in panels]
     )
 
 
