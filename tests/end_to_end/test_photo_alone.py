@@ -171,3 +171,30 @@ def test_real_people_look_as_densepose_sees_them(mt, tmp_path: Path, samples: Pa
     assert np.mean([score.part_agreement for score in scores]) > 0.86
     assert np.mean([score.uv_error for score in scores]) < 0.06
     assert np.mean([score.iou for score in scores]) > 0.87
+
+
+def test_the_preview_of_a_clip_shows_its_pictures(tmp_path: Path) -> None:
+    from motion_transfer.preview.session import Session
+    from motion_transfer.render.options import RenderOptions
+
+    clip = film_of_the_astronaut(tmp_path / "clip.mp4", 5)
+    options = RenderOptions(
+        source=ASTRONAUT, driver=clip, output=tmp_path / "out.mp4", renderer="texture"
+    )
+    session = Session(options, tmp_path / "job.yaml")
+    try:
+        session.wait_for_plan()
+        assert session.state()["driver"]["pictures"]
+        shown = {
+            view: cv2.imdecode(
+                np.frombuffer(session.ask_frame(3, view, session.key).result(), np.uint8),
+                cv2.IMREAD_COLOR,
+            )
+            for view in ("pictures", "result")
+        }
+        assert shown["pictures"].shape == shown["result"].shape == (240, 320, 3)
+        assert np.abs(shown["pictures"][:, :20].astype(int) - 190).max() < 20  # the grey room
+        with pytest.raises(InputError, match="start again with --driver-person 0"):
+            session.change({"driver_person": "0"})
+    finally:
+        session.close()
