@@ -194,19 +194,22 @@ class Session:
         if "renderer" in parsed:  # weights go with the network, and come back with it
             parsed["weights"] = None if parsed["renderer"] == "texture" else self._weights
         changed = replace(self.options, **parsed)
-        if "person" in words:
-            self.source = self._queue.ask(lambda: self.pictures.source(changed)).result()
-            self._errors.pop("source", None)
         if self.look is not None and self.look.pictures and "driver_person" in words:
             raise InputError(
                 "whom to follow in raw pictures is decided when they are read; start again with"
                 f" --driver-person {changed.driver_person}"
             )
+        source = None
+        if "person" in words:
+            source = self._queue.ask(lambda: self.pictures.source(changed)).result()
         with self._lock:  # the driver may have been looked through meanwhile
             if self.look is not None:
                 self.plans = plan_frames(self.look, changed)
             self.options = changed
             self._errors.pop("plan", None)
+            if source is not None:
+                self.source = source
+                self._errors.pop("source", None)
         self._touch()
 
     # results

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 from motion_transfer.errors import InputError, OutputError
@@ -19,8 +20,6 @@ def write_frame(options: RenderOptions, index: int, output: Path) -> None:
 
     Raises: InputError if there is no such frame; OutputError if the file cannot be written.
     """
-    import threading
-
     if output.suffix.lower() != ".png":
         raise OutputError(f"{output} is no .png; one frame is written as PNG")
     check_destination(output, force=options.force)

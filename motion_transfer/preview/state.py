@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from motion_transfer.preview.words import command_line
 from motion_transfer.render.options import DEFAULT_RATE, RENDERERS, parse_window
+from motion_transfer.render.prepare import frame_size
 from motion_transfer.render.recipe import Recipe
 
 if TYPE_CHECKING:
@@ -90,12 +91,11 @@ def _output_size(session: Session) -> dict[str, int] | None:
     options, look, plans = session.options, session.look, session.plans
     if look is None or plans is None:
         return None
-    height, width = look.reader.height, look.reader.width
+    crop = 0
     if options.size == "crop":
         recipe = Recipe(options.renderer, options.weights_file)
-        height = width = recipe.working_size(max(shot.window.side for shot in plans.shots))
-    elif options.size == "even":
-        height, width = height + height % 2, width + width % 2
+        crop = recipe.working_size(max(shot.window.side for shot in plans.shots))
+    height, width = frame_size(options, look.reader.height, look.reader.width, crop)
     return {"width": width, "height": height}
 
 

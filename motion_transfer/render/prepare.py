@@ -277,14 +277,22 @@ def is_in_place(options: RenderOptions, source: Source) -> bool:
     return options.driver.resolve() in (photo, iuv)
 
 
+def frame_size(
+    options: RenderOptions, height: int, width: int, working_size: int
+) -> tuple[int, int]:
+    """Height and width, px, of an output frame without a comparison; arguments as below."""
+    if options.size == "crop":
+        return working_size, working_size
+    if options.size == "even":
+        return height + height % 2, width + width % 2
+    return height, width
+
+
 def make_canvas(
     options: RenderOptions, height: int, width: int, working_size: int, source: Source
 ) -> Canvas:
     """An empty output for a driver of that size, px; `working_size` is the renderer's crop's."""
-    if options.size == "crop":
-        height = width = working_size
-    if options.size == "even":
-        height, width = height + height % 2, width + width % 2
+    height, width = frame_size(options, height, width, working_size)
     comparison = Comparison(source, height, width) if options.compare else None
     in_place = is_in_place(options, source)
     background = make_background(options.background, (height, width), source, in_place=in_place)
