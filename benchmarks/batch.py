@@ -29,7 +29,7 @@ from typing import Any
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, before torch
 
-from workload import SOURCE, driver_folder, random_checkpoint
+from workload import SOURCE, driver_folder, weights_of
 
 MT = [sys.executable, "-m", "motion_transfer", "batch"]
 JOBS = 10_000
@@ -127,7 +127,7 @@ def manifest(folder: Path, sizes: Sizes) -> None:
 
 
 def shared(folder: Path, sizes: Sizes) -> None:
-    weights = str(random_checkpoint(folder, sizes.preset))
+    weights = str(weights_of(folder, sizes.preset))
     network = {"renderer": "nhrr", "weights": weights, "compile": False, "frames": "0"}
     driver = driver_folder(folder, 8)
     told = run_manifest(write_manifest(folder, "shared", driver, 20, suffix=".json", **network))
@@ -148,7 +148,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
         driver=driver_folder(folder, sizes.frames),
         output=folder / "overhead.mp4",
         renderer="nhrr",
-        weights=random_checkpoint(folder, sizes.preset),
+        weights=weights_of(folder, sizes.preset),
         compile=not sizes.quick,
     )
     with WorkFolder(options.output) as work:
@@ -181,7 +181,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
 
 def workers(folder: Path, sizes: Sizes) -> None:
     cores = len(os.sched_getaffinity(0))
-    weights = str(random_checkpoint(folder, sizes.preset))
+    weights = str(weights_of(folder, sizes.preset))
     network = {"renderer": "nhrr", "weights": weights, "compile": not sizes.quick}
     counts = [count for count in (1, 2, 4, 8, 16, 32) if count <= cores]
     driver = driver_folder(folder, sizes.frames)

@@ -24,7 +24,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, before torch
 
 import numpy as np
-from workload import SOURCE, driver_folder, random_checkpoint
+from workload import SOURCE, driver_folder, weights_of
 
 from motion_transfer.media.work import WorkFolder
 from motion_transfer.render.engine import Engine
@@ -56,7 +56,7 @@ def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> N
         source=SOURCE,
         driver=driver,
         output=folder / "nhrr.mp4",
-        weights=random_checkpoint(folder, preset),
+        weights=weights_of(folder, preset),
     )
     began = time.perf_counter()
     with WorkFolder(options.output) as work:

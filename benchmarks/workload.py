@@ -10,6 +10,7 @@ import torch
 
 from motion_transfer.media.iuv_stream import open_reader, open_stream
 from motion_transfer.weights.checkpoint import save_checkpoint
+from motion_transfer.weights.shipped import SHIPPED, find_weights
 from nhrr_core import ModelConfig, NeuralReRenderer
 
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"
@@ -26,6 +27,12 @@ def driver_folder(folder: Path, frame_count: int) -> Path:
         for index, iuv in enumerate(islice(cycle(frames), frame_count)):
             cv2.imwrite(str(path / f"{index:05d}_IUV.png"), iuv)  # RGB = V, U, I
     return path
+
+
+def weights_of(folder: Path, preset: str) -> Path:
+    """A preset's weights: those that ship, whose frames look to an encoder as users' do, or random
+    ones, which are the same work for the network."""
+    return find_weights(Path(preset)) if preset in SHIPPED else random_checkpoint(folder, preset)
 
 
 def random_model(preset: str) -> NeuralReRenderer:

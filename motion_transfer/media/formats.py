@@ -46,7 +46,7 @@ CODECS = {
         "libx264",
         "yuv420p",
         18,
-        {"preset": "faster", "x264-params": "open-gop=0" + X264_INSTRUCTIONS},
+        {"preset": "veryfast", "x264-params": "open-gop=0" + X264_INSTRUCTIONS},
         highest_crf=51,
     ),
     "h265": Codec(

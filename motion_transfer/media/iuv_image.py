@@ -107,7 +107,7 @@ def to_iuv(raw: Raw, order: ChannelOrder, where: str) -> UInt8[np.ndarray, "H W 
             f"{where} has part index {highest}; DensePose has parts 1 to {PART_COUNT}, and other"
             f" frames say that channel {1 if order == 'iuv' else 3} holds them"
         )
-    return raw if order == "iuv" else np.ascontiguousarray(raw[..., ::-1])
+    return raw if order == "iuv" else cv2.cvtColor(raw, cv2.COLOR_BGR2RGB)
 
 
 def _check_png(data: bytes, where: str) -> None:

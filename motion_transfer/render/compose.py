@@ -77,7 +77,12 @@ def paste(frame: Frame, rgba: UInt8[np.ndarray, "S S 4"], window: Window) -> Non
     rows, columns, own_rows, own_columns = window.visible(*frame.shape[:2])
     over = rgba[own_rows, own_columns]
     target = frame[rows, columns]
-    coverage = np.ascontiguousarray(over[..., 3])
+    coverage = cv2.extractChannel(over, 3)
+    left, top, width, height = cv2.boundingRect(coverage)
+    if not width:
+        return
+    person = np.s_[top : top + height, left : left + width]
+    over, target, coverage = over[person], target[person], coverage[person]
     colour = cv2.cvtColor(over, cv2.COLOR_RGBA2RGB)
     edge = np.nonzero(cv2.inRange(coverage, 1, 254))
     weight = coverage[edge][:, None].astype(np.uint16)

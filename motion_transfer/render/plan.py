@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
-from hashlib import sha256
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 from jaxtyping import UInt8
+from xxhash import xxh3_128_hexdigest
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv_stream import IuvReader, Missing
@@ -50,8 +50,8 @@ class FrameReader(Protocol):
 
 
 def digest_of_iuv(iuv: UInt8[np.ndarray, "H W 3"]) -> str:
-    """Of a frame's content; hexadecimal."""
-    return sha256(np.ascontiguousarray(iuv).data).hexdigest()
+    """Of a frame's content, hexadecimal: tells changes by accident, which take no cryptography."""
+    return xxh3_128_hexdigest(np.ascontiguousarray(iuv).data)
 
 
 @dataclass(frozen=True)

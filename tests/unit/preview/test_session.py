@@ -216,6 +216,7 @@ def test_an_option_changes_the_pictures_and_their_key(options: RenderOptions, op
         ({"output": "/etc/passwd"}, "option 'output'"),
         ({"source": "/etc/passwd"}, "option 'source'"),
         ({"background": "black", "frames": "9:3"}, "frames 9:3"),
+        ({"person": "0", "frames": "50:60"}, "has 40"),
     ],
 )
 def test_what_cannot_be_changes_nothing(
@@ -223,11 +224,13 @@ def test_what_cannot_be_changes_nothing(
 ) -> None:
     session = open_session(options)
     session.wait_for_plan()
-    before = session.key
+    wait_for(lambda: session.source is not None)
+    before = session.key, session.source
     with pytest.raises(InputError, match=reason):
         session.change(words)
     assert session.options == options
-    assert session.key == before
+    assert session.key == before[0]
+    assert session.source is before[1]
 
 
 @pytest.mark.parametrize(
