@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from bisect import bisect
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,6 +20,9 @@ from motion_transfer.render.prepare import given_window
 from motion_transfer.render.window import Window
 
 SAMPLED_FRAMES = 12
+SAMPLE_SECONDS = 0.2
+"""Whoever opens the page waits for it; a jump within a long video may take a second."""
+
 NOBODY = SeenFrame(People((), 0), "")
 
 
@@ -74,10 +78,7 @@ def plan_frames(look: DriverLook, options: RenderOptions) -> FramePlans:
     chosen = frame_range(options.frames, look.frame_count, str(options.driver))
     if look.whole:
         return _plan_exactly(look, options, chosen)
-    sample = np.linspace(chosen.start, chosen.stop - 1, min(SAMPLED_FRAMES, len(chosen)))
-    frames = sorted({int(index) for index in sample.round()})
-    look.look_at(frames)
-    frames = [index for index in frames if index in look.seen]
+    frames = _look_at_some(look, chosen)
     plan = _plan(look, options, [look.seen[index] for index in frames], range(len(frames)), ())
     known = dict(zip(frames, plan.frames, strict=True))
     return FramePlans(
@@ -87,6 +88,20 @@ def plan_frames(look: DriverLook, options: RenderOptions) -> FramePlans:
         (),
         exact=False,
     )
+
+
+def _look_at_some(look: DriverLook, chosen: range) -> list[int]:
+    """Frames all over the chosen ones, as many as there is time for; at least one, if one can be
+    read."""
+    sample = np.linspace(chosen.start, chosen.stop - 1, min(SAMPLED_FRAMES, len(chosen)))
+    frames = sorted({int(index) for index in sample.round()})
+    end = time.monotonic() + SAMPLE_SECONDS
+    # the first, the middle, the quarters, ...
+    for place in sorted(range(len(frames)), key=lambda place: f"{place:08b}"[::-1]):
+        look.look_at([frames[place]])
+        if time.monotonic() > end and not look.seen.keys().isdisjoint(frames):
+            break
+    return [index for index in frames if index in look.seen]
 
 
 def _plan_exactly(look: DriverLook, options: RenderOptions, chosen: range) -> FramePlans:
