@@ -1,8 +1,9 @@
 """The preview: a frame over HTTP against the renderer alone, and its memory after many frames.
 
-    python benchmarks/preview.py [--only latency|memory|start] [--renderer nhrr] [--frames 40]
+    python benchmarks/preview.py [--only start|page|latency|memory] [--renderer nhrr] [--frames 40]
 
 * `start`: from the command to the link, and to the first frame, a draft and the network's;
+* `page`: in a Chromium, from following the link of a running preview to the first picture;
 * `latency`: each request is a jump to another frame; between requests the same frame is drawn here,
   by the renderer alone, so that both meet the same noise of the machine;
 * `memory`: of the server after 500 and after 5,000 frames that were looked at.
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import random
+import shutil
 import subprocess
 import sys
 import time
@@ -40,13 +42,15 @@ LOOKED_AT = (500, 5000)
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", choices=("start", "latency", "memory"))
+    parser.add_argument("--only", choices=("start", "page", "latency", "memory"))
     parser.add_argument("--renderer", default="nhrr")
     parser.add_argument("--frames", type=int, default=40)
     given = parser.parse_args()
     if given.only in (None, "start"):
         for number in range(3):
             measure_start(number)
+    if given.only in (None, "page"):
+        measure_page()
     if given.only in (None, "latency"):
         measure_latency(given.renderer, given.frames)
     if given.only in (None, "memory"):
@@ -58,7 +62,8 @@ class Page:
 
     def __init__(self, process: subprocess.Popen) -> None:
         assert process.stdout is not None
-        link = urlsplit(process.stdout.readline().strip())
+        self.link = process.stdout.readline().strip()
+        link = urlsplit(self.link)
         self.process, self._path = process, link.path
         self._connection = HTTPConnection(link.hostname or "", link.port, timeout=120)
 
@@ -130,6 +135,30 @@ def measure_start(number: int) -> None:
         page.frame(0, page.state()["key"])
         drawn = time.perf_counter() - began
     print(f"start {number}: link {linked:.2f} s, draft {drafted:.2f} s, network {drawn:.2f} s")
+
+
+def measure_page(rounds: int = 5) -> None:
+    """The first of them meets a server that has drawn nothing yet."""
+    from playwright.sync_api import sync_playwright
+
+    with server("nhrr") as page, sync_playwright() as player:
+        page.planned()
+        browser = player.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+        )
+        seconds = []
+        for _ in range(rounds):
+            tab = browser.new_page()
+            began = time.perf_counter()
+            tab.goto(page.link)
+            image = tab.locator("#over[data-view=result]")
+            image.wait_for()
+            while not image.evaluate("image => image.complete && image.naturalWidth > 0"):
+                time.sleep(0.005)
+            seconds.append(time.perf_counter() - began)
+            tab.close()
+        browser.close()
+    print(f"page: first picture after {seconds[0]:.2f} s; then median {median(seconds[1:]):.2f} s")
 
 
 def measure_latency(renderer: str, count: int) -> None:

@@ -35,6 +35,7 @@ from nhrr_core.texture import (
     measure_surroundings,
     merge_textures,
     mirror_texture,
+    shrink_texture,
 )
 from nhrr_core.uv_layout import UVLayout, load_uv_layout, texture_coordinates
 
@@ -72,6 +73,7 @@ __all__ = [
     "normalise_iuv",
     "perceptual_loss",
     "sample_features",
+    "shrink_texture",
     "texture_coordinates",
     "texture_loss",
 ]

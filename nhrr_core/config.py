@@ -22,13 +22,15 @@ class ModelConfig:
     Source: the paper, Sec. 3; widths from Pix2PixHD's global generator (RenderNet) and U-Net
     (FeatureNet). Departs from it: `visibility_input` (on) gives FeatureNet the visibility as a
     fourth channel, because an unseen texel and a mid-grey one are otherwise the same input.
-    Two more are off, and on in `lite`, so that networks learn in hours what to change instead of
+    Three more are off, and on in `lite`, so that networks learn in hours what to change instead of
     learning in days to copy. `prefilled` gives FeatureNet a texture whose hidden texels show their
     mirror image on the body (`mirror_texture`) or else the colours around them (`fill_texture`),
     and as one more channel which of the two.
     `colour_shortcut` carries colours past both networks: FeatureNet's first three channels are
     added to its input's, and RenderNet writes one more channel, the share with which the feature
     image's first three show through its drawing, as in Vid2Vid (Wang et al., NeurIPS 2018, Sec. 3).
+    `colour_margin` carries those three beyond the body's outline (`spread_colours`), where clothes
+    and hair are.
 
     Attributes:
         variant: `full`; `no-int` (same networks, trained without the texture loss); `ip` (the map
@@ -41,7 +43,7 @@ class ModelConfig:
         texture_size: side of the UV texture in texels, a multiple of 16.
         image_size: side of the image RenderNet works on in pixels, a multiple of 2**down_blocks.
         alpha: RenderNet has a fourth output, the person's coverage.
-        visibility_input, prefilled, colour_shortcut: see above.
+        visibility_input, prefilled, colour_shortcut, colour_margin: see above.
     """
 
     variant: Variant = "full"
@@ -56,11 +58,12 @@ class ModelConfig:
     visibility_input: bool = True
     prefilled: bool = False
     colour_shortcut: bool = False
+    colour_margin: bool = False
 
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
             raise ConfigError(f"variant is {self.variant!r}; supported are {', '.join(VARIANTS)}")
-        for name in ("alpha", "visibility_input", "prefilled", "colour_shortcut"):
+        for name in ("alpha", "visibility_input", "prefilled", "colour_shortcut", "colour_margin"):
             if not isinstance(getattr(self, name), bool):
                 raise ConfigError(f"{name} is {getattr(self, name)!r}; it must be true or false")
         for name, low, high, multiple in (
@@ -106,6 +109,12 @@ class ModelConfig:
         return self.variant in ("full", "no-int", "ip")
 
     @property
+    def finest_texture(self) -> int:
+        """Side of the largest partial texture that is of use: where colours are carried past
+        FeatureNet, twice what that works on."""
+        return self.texture_size * (2 if self.has_feature_net and self.colour_shortcut else 1)
+
+    @property
     def feature_inputs(self) -> int:
         """Channels that FeatureNet reads: RGB, and what is known of each texel."""
         return COLOUR_CHANNELS + int(self.visibility_input) + int(self.prefilled)
@@ -133,5 +142,11 @@ class ModelConfig:
 
 PRESETS = {
     "paper": ModelConfig(),
-    "lite": ModelConfig(feature_width=32, render_width=32, prefilled=True, colour_shortcut=True),
+    "lite": ModelConfig(
+        feature_width=32,
+        render_width=32,
+        prefilled=True,
+        colour_shortcut=True,
+        colour_margin=True,
+    ),
 }

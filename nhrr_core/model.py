@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
@@ -11,14 +12,18 @@ from nhrr_core.errors import ShapeError
 from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import normalise_iuv
 from nhrr_core.render_net import RenderNet
-from nhrr_core.sampling import sample_features
+from nhrr_core.sampling import sample_features, spread_colours
 from nhrr_core.texture import (
     extract_texture,
     fill_texture,
     measure_surroundings,
     mirror_texture,
+    shrink_texture,
 )
 from nhrr_core.uv_layout import load_uv_layout
+
+MARGIN_LEVELS = 5
+"""Colours reach at least 16 pixels beyond the body, and 48 at most: loose clothes and hair."""
 
 
 class NeuralReRenderer(nn.Module):
@@ -81,23 +86,37 @@ class NeuralReRenderer(nn.Module):
     ) -> Float[Tensor, "B D T T"]:
         """The UV feature map of a partial texture; for the warp variants, that texture itself.
 
+        With `config.colour_shortcut` the texture may be a multiple of `config.texture_size`:
+        FeatureNet works at its own size, and what it adds to the colours is added to the finer.
         Raises: ShapeError if its side is not a multiple of 16.
         """
         if self.feature_net is None:
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
             raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
+        if not self.config.colour_shortcut:
+            return self.feature_net(torch.cat(self._filled(texture, visibility), dim=1))
+        factor, rest = divmod(texture.shape[-1], self.config.texture_size)
+        factor = 1 if rest else factor
+        own = self._filled(*shrink_texture(texture, visibility, factor))
+        feature_map = self.feature_net(torch.cat(own, dim=1))
+        if factor > 1:
+            feature_map = F.interpolate(feature_map, scale_factor=factor, mode="bilinear")
+        fine = self._filled(texture, visibility)[0] if factor > 1 else own[0]
+        colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
+        return torch.cat([colours + fine, others], dim=1)
+
+    def _filled(
+        self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
+    ) -> list[Tensor]:
+        """What FeatureNet reads: the texture, filled if it is to be, and what is known of it."""
         known = [visibility] if self.config.visibility_input else []
         if self.config.prefilled:
             twins = self.side_twin, self.depth_twin
             texture, shown = mirror_texture(texture, visibility, *twins)
             texture = fill_texture(texture, shown, self.position, self.surroundings)
             known.append(shown)
-        feature_map = self.feature_net(torch.cat([texture, *known], dim=1))
-        if not self.config.colour_shortcut:
-            return feature_map
-        colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
-        return torch.cat([colours + texture, others], dim=1)
+        return [texture, *known]
 
     def feature_image(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
@@ -128,14 +147,17 @@ class NeuralReRenderer(nn.Module):
     ) -> Float[Tensor, "B K H W"]:
         """The frame, from what RenderNet drew of a feature image.
 
-        With `config.colour_shortcut` the image's colours show through where it shows the body;
-        otherwise it is the drawing.
+        With `config.colour_shortcut` the image's colours show through where it shows the body,
+        with `config.colour_margin` also around it; otherwise it is the drawing.
         """
         if not self.config.colour_shortcut:
             return drawn
         painted, alpha, share = drawn.tensor_split([COLOUR_CHANNELS, -1], dim=1)
         colours = feature_image[:, :COLOUR_CHANNELS].clamp(-1, 1)
         body = (feature_image != 0).any(dim=1, keepdim=True)
+        if self.config.colour_margin:
+            colours = spread_colours(colours, body, MARGIN_LEVELS)
+            body = torch.ones_like(body)
         return torch.cat([torch.lerp(painted, colours, body * (share + 1) / 2), alpha], dim=1)
 
     def forward(

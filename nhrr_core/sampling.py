@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from nhrr_core.errors import ShapeError
 from nhrr_core.uv_layout import texture_coordinates
+
+TINY = 1e-6
 
 
 def sample_features(
@@ -40,3 +42,29 @@ def sample_features(
         align_corners=False,
     )
     return torch.where(iuv[:, :1] > 0, sampled, 0)
+
+
+def spread_colours(
+    colours: Float[Tensor, "B C H W"], known: Bool[Tensor, "B 1 H W"], levels: int
+) -> Float[Tensor, "B C H W"]:
+    """Carry colours beyond the outline of what is known, each place a mean of what lies nearest.
+
+    Args:
+        known: where they are known; there they stay as they are.
+        levels: how often means of 2 x 2 are taken; colours reach 2**(levels - 1) pixels at least.
+    Returns: the colours; 0 beyond their reach.
+    Source: the pull-push of Gortler et al., "The Lumigraph" (SIGGRAPH 1996), Sec. 4.2.
+    """
+    height, width = known.shape[2:]
+    padding = 0, -width % 2**levels, 0, -height % 2**levels
+    weighted = F.pad(torch.cat([colours, torch.ones_like(colours[:, :1])], 1) * known, padding)
+    means = [weighted]
+    for _ in range(levels):
+        mean = F.avg_pool2d(means[-1], 2)
+        means.append(mean / mean[:, -1:].clamp_min(TINY))  # weights are 0 or 1 again
+    filled = means.pop()
+    while means:
+        finer = means.pop()
+        filled = F.interpolate(filled, scale_factor=2, mode="bilinear")
+        filled = torch.where(finer[:, -1:] > 0, finer, filled / filled[:, -1:].clamp_min(TINY))
+    return filled[:, :-1, :height, :width]

@@ -80,6 +80,22 @@ def extract_texture(
     )
 
 
+def shrink_texture(
+    texture: Float[Tensor, "B C T T"], visibility: Float[Tensor, "B 1 T T"], factor: int
+) -> tuple[Float[Tensor, "B C t t"], Float[Tensor, "B 1 t t"]]:
+    """A coarser partial texture: each texel the mean of those seen in its place, seen where any is.
+
+    Args:
+        texture: 0 where it is not seen.
+        factor: t = T / factor.
+    """
+    if factor == 1:
+        return texture, visibility
+    share = F.avg_pool2d(visibility, factor)
+    mean = F.avg_pool2d(texture, factor) / share.clamp_min(1 / factor**2)
+    return mean, (share > 0).to(visibility.dtype)
+
+
 def merge_textures(
     layers: list[tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]],
 ) -> tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]:

@@ -135,7 +135,7 @@ class WeightsCandidate(RenderedCandidate):
         self._path = path
         super().__init__(
             path.stem,
-            texture_size=self._model.config.texture_size,
+            texture_size=self._model.config.finest_texture,
             takes_turns=True,
             background=background,
         )

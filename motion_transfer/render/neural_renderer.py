@@ -35,7 +35,7 @@ class PreparedNetwork:
         if compile:
             side = self.config.image_size
             blank = torch.zeros(self.batch_size, 3, side, side, dtype=torch.uint8)
-            map_side = self.config.texture_size
+            map_side = self.config.finest_texture
             shape = (1, self.config.map_channels, map_side, map_side)
             self.draw(torch.zeros(shape, device=self.device), blank)
 

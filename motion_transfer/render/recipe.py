@@ -54,7 +54,7 @@ class Recipe:
             return TEXTURE_SIZE
         from motion_transfer.weights.checkpoint import inspect_checkpoint
 
-        return inspect_checkpoint(self.weights).config.texture_size
+        return inspect_checkpoint(self.weights).config.finest_texture
 
     def working_size(self, window_side: int) -> int:
         """Side of the crops that the renderer will want, px. Raises: WeightsError."""

@@ -6,7 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ from nhrr_core.config import PRESETS
 
 SECTIONS = {section.name: section for section in fields(TrainConfig)}
 DEFAULT_PRESET = "lite"
+FREE_TO_CHANGE = ("colour_margin",)
+"""Settings of the model that shape no weights: a run may set them, whatever it starts from."""
 
 
 def read_settings(path: Path) -> dict[str, Any]:
@@ -119,6 +121,7 @@ def _build_model(values: dict[str, Any], given: ModelConfig | None) -> ModelConf
     try:
         if given is None:
             return ModelConfig.preset(preset, **values)
+        given = replace(given, **{name: values[name] for name in FREE_TO_CHANGE if name in values})
         other = [name for name, value in values.items() if getattr(given, name) != value]
         if other:
             raise InputError(

@@ -10,7 +10,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.utils.data import Dataset, Sampler
@@ -23,6 +22,7 @@ from motion_transfer.render.source import unfold
 from motion_transfer.render.window import Window, plan_window
 from motion_transfer.training.pairs import Pair, flat_stem
 from motion_transfer.training.pictures import PersonPicture, Picture
+from nhrr_core import shrink_texture
 from nhrr_core.iuv import PART_COUNT
 
 Image = UInt8[np.ndarray, "H W 3"]
@@ -133,7 +133,7 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         self, picture: Picture, shrink: int, loaded: PersonPicture | None = None
     ) -> Texture:
         """Rounded to 8 bits, whether it was kept or not, so that both are the same."""
-        return _shrink(_as_texture(*self._unfolded(picture, loaded)), shrink)
+        return shrink_texture(*_as_texture(*self._unfolded(picture, loaded)), shrink)
 
     def _unfolded(
         self, picture: Picture, loaded: PersonPicture | None
@@ -230,16 +230,6 @@ def _unfold(picture: PersonPicture, size: int) -> tuple[Image, UInt8[np.ndarray,
 def _as_texture(rgb: Image, seen: UInt8[np.ndarray, "T T"]) -> Texture:
     visibility = (_chw(seen[..., None]) > 0).float()
     return to_tensor(rgb) * visibility, visibility
-
-
-def _shrink(texture: Texture, shrink: int) -> Texture:
-    """Each texel the mean of those seen in its place, seen where any of them is."""
-    colours, visibility = texture
-    if shrink == 1:
-        return texture
-    share = F.avg_pool2d(visibility, shrink)
-    mean = F.avg_pool2d(colours, shrink) / share.clamp_min(1 / shrink**2)
-    return mean, (share > 0).float()
 
 
 def _keep(path: Path, rgb: Image, seen: UInt8[np.ndarray, "T T"]) -> None:

@@ -20,6 +20,7 @@ from nhrr_core import (
     mirror_texture,
     normalise_iuv,
     sample_features,
+    shrink_texture,
 )
 
 SMALL = ModelConfig(
@@ -158,6 +159,32 @@ def test_a_filled_texture_is_what_feature_net_starts_from(photo: Tensor, iuv: Te
     assert torch.allclose(model.encode_texture(texture, visibility), expected, atol=1e-6)
 
 
+def test_a_finer_texture_keeps_its_detail(photo: Tensor, iuv: Tensor) -> None:
+    torch.manual_seed(0)
+    model = small(colour_shortcut=True)
+    assert model.feature_net is not None
+    size = model.config.finest_texture
+    assert size == 2 * model.config.texture_size
+    fine, visibility = extract_texture(photo, iuv, model.charts, size)
+    coarse = torch.cat(shrink_texture(fine, visibility, 2), dim=1)
+    change = nn.functional.interpolate(model.feature_net(coarse), size=size, mode="bilinear")
+    expected = torch.cat([change[:, :3] + fine, change[:, 3:]], dim=1)
+    assert torch.allclose(model.encode_texture(fine, visibility), expected, atol=1e-6)
+    assert small().config.finest_texture == small().config.texture_size
+
+
+def test_a_finer_texture_is_filled_as_finely(photo: Tensor, iuv: Tensor) -> None:
+    model = small(prefilled=True, colour_shortcut=True)
+    assert model.feature_net is not None
+    torch.nn.init.zeros_(model.feature_net.exit.weight)
+    torch.nn.init.zeros_(model.feature_net.exit.bias)
+    fine, visibility = extract_texture(photo, iuv, model.charts, 128)
+    layout = load_uv_layout()
+    mirrored, shown = mirror_texture(fine, visibility, layout.side_twin, layout.depth_twin)
+    filled = fill_texture(mirrored, shown, layout.position, measure_surroundings(layout.position))
+    assert torch.equal(model.encode_texture(fine, visibility)[:, :3], filled)
+
+
 @pytest.mark.parametrize("alpha", [False, True])
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_share_of_the_shortcut(targets: Tensor, variant: str, alpha: bool) -> None:
@@ -177,6 +204,18 @@ def test_the_share_of_the_shortcut(targets: Tensor, variant: str, alpha: bool) -
     assert torch.allclose(frame[2, :3], (drawn[2, :3] + colours[2]) / 2)
     if alpha:
         assert torch.equal(frame[:, 3], drawn[:, 3])
+
+
+def test_the_margin_of_the_shortcut() -> None:
+    model = small(colour_shortcut=True, colour_margin=True)
+    image = torch.rand(2, 16, 64, 64) * 2 - 1
+    image[0, :, :, 20:] = 0
+    image[0, :3, :, :20] = torch.tensor([0.2, -0.4, 0.6])[:, None, None]
+    drawn = torch.zeros(2, 4, 64, 64)
+    drawn[:, 3] = 1  # all of the share
+    frame = model.blend(drawn, image)
+    assert torch.allclose(frame[0, :, :, :40], image[0, :3, :, :1].expand(-1, 64, 40), atol=1e-5)
+    assert torch.equal(frame[1], image[1, :3])
 
 
 def test_rendering_blends(targets: Tensor) -> None:

@@ -6,6 +6,7 @@ from reference.nhrr_core_loops import sample_features_loops
 from torch import Tensor
 
 from nhrr_core import ShapeError, sample_features
+from nhrr_core.sampling import spread_colours
 
 
 @pytest.fixture
@@ -132,3 +133,38 @@ def test_another_number_of_maps_raises(charts: Tensor, maps: int, images: int) -
         sample_features(torch.rand(maps, 2, 8, 8), iuv, charts)
     message = f"{maps} feature maps for {images} IUV images; give 1 or {images}"
     assert str(raised.value) == message
+
+
+@pytest.mark.parametrize("size", [(64, 64), (50, 37)])
+def test_colours_spread_beyond_what_is_known(size: tuple[int, int]) -> None:
+    torch.manual_seed(0)
+    colours = torch.rand(2, 3, *size) + 0.5
+    known = torch.zeros(2, 1, *size, dtype=torch.bool)
+    known[0, :, 10:30, 5:9] = True
+    spread = spread_colours(colours * known, known, 4)
+    assert torch.equal(spread[0][:, known[0, 0]], colours[0][:, known[0, 0]])
+    near = spread[0, :, 5:35, 9:16]
+    assert near.min() >= 0.5 - 1e-5
+    assert near.max() <= 1.5 + 1e-5
+    assert not spread[1].any()  # nothing is known
+    assert not spread[0, :, 10:30, 35:].any()  # beyond the reach
+
+
+def test_one_colour_spreads_as_itself() -> None:
+    known = torch.zeros(1, 1, 64, 64, dtype=torch.bool)
+    known[..., 20:40, 20:30] = True
+    colour = torch.tensor([0.3, -0.7, 1.0])[:, None, None]
+    spread = spread_colours(colour * known, known, 5)
+    assert torch.allclose(spread[..., :46], colour.expand(1, 3, 64, 46), atol=1e-5)
+
+
+def test_colours_stay_near_what_they_spread_from() -> None:
+    known = torch.zeros(1, 1, 64, 64, dtype=torch.bool)
+    known[..., 24:40, 10:20] = True
+    known[..., 24:40, 44:54] = True
+    colours = torch.zeros(1, 1, 64, 64)
+    colours[..., 44:54] = 1
+    row = spread_colours(colours * known, known, 4)[0, 0, 32]
+    assert row[20] < 0.05
+    assert row[43] > 0.95
+    assert (row[20:44].diff() >= -1e-5).all()

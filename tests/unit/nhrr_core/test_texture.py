@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from itertools import product
+
+import numpy as np
 import pytest
 import torch
 import torch.nn.functional as F
@@ -17,6 +20,7 @@ from nhrr_core import (
     merge_textures,
     mirror_texture,
     sample_features,
+    shrink_texture,
 )
 
 
@@ -376,6 +380,22 @@ def layer(colour: float, *columns: int) -> tuple[Tensor, Tensor]:
     visibility = torch.zeros(1, 1, 4, 4)
     visibility[..., list(columns)] = 1
     return colour * visibility.expand(1, 3, 4, 4), visibility
+
+
+def test_a_coarser_texture_is_the_mean_of_what_is_seen() -> None:
+    visibility = (torch.rand(2, 1, 8, 8) > 0.6).float()
+    visibility[:, :, :2, :2] = 0
+    texture = torch.rand(2, 3, 8, 8) * visibility
+    coarse, seen = shrink_texture(texture, visibility, 2)
+    assert coarse.shape == (2, 3, 4, 4)
+    for image, row, column in product(range(2), range(4), range(4)):
+        place = np.s_[:, 2 * row : 2 * row + 2, 2 * column : 2 * column + 2]
+        there = visibility[image][place].flatten() > 0
+        assert seen[image, 0, row, column] == float(there.any())
+        colours = texture[image][place].flatten(1)[:, there]
+        expected = colours.mean(1) if there.any() else torch.zeros(3)
+        assert torch.allclose(coarse[image, :, row, column], expected)
+    assert shrink_texture(texture, visibility, 1)[0] is texture
 
 
 def test_one_layer_stays_as_it_is() -> None:
