@@ -118,7 +118,7 @@ class Session:
             if key != self.key:
                 raise StaleError
         if draft:
-            options = replace(options, renderer="texture", weights=None)
+            options = draft_of(options)
         draft = options.renderer == "texture"
         calls: dict[str, Callable[[], np.ndarray]] = {
             "result": lambda: self.pictures.result(options, look, plans, index),
@@ -201,7 +201,7 @@ class Session:
             )
         source = None
         if "person" in words:
-            source = self._queue.ask(lambda: self.pictures.source(changed)).result()
+            source = self._queue.ask(lambda: self.pictures.source(draft_of(changed))).result()
         with self._lock:  # the driver may have been looked through meanwhile
             if self.look is not None:
                 self.plans = plan_frames(self.look, changed)
@@ -275,7 +275,7 @@ class Session:
 
     def _find_source(self) -> None:
         try:
-            self.source = self.pictures.source(self.options)
+            self.source = self.pictures.source(draft_of(self.options))
             self.source_people = count_people(self.source, self.options)
         except Exception as error:  # the page has to say so, whatever it was
             self._errors["source"] = _in_words(error)
@@ -313,6 +313,11 @@ class Session:
     def _touch(self) -> None:
         with self._lock:
             self.revision += 1
+
+
+def draft_of(options: RenderOptions) -> RenderOptions:
+    """The same without the network: at hand within a second, and the source's texture with it."""
+    return replace(options, renderer="texture", weights=None)
 
 
 class _ClosingError(Exception):
