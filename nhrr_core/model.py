@@ -94,17 +94,19 @@ class NeuralReRenderer(nn.Module):
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
             raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
+        fine = own = self._filled(texture, visibility)
         if not self.config.colour_shortcut:
-            return self.feature_net(torch.cat(self._filled(texture, visibility), dim=1))
+            return self.feature_net(torch.cat(own, dim=1))
         factor, rest = divmod(texture.shape[-1], self.config.texture_size)
-        factor = 1 if rest else factor
-        own = self._filled(*shrink_texture(texture, visibility, factor))
+        if rest:
+            factor = 1
+        if factor > 1:
+            own = self._filled(*shrink_texture(texture, visibility, factor))
         feature_map = self.feature_net(torch.cat(own, dim=1))
         if factor > 1:
             feature_map = F.interpolate(feature_map, scale_factor=factor, mode="bilinear")
-        fine = self._filled(texture, visibility)[0] if factor > 1 else own[0]
         colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
-        return torch.cat([colours + fine, others], dim=1)
+        return torch.cat([colours + fine[0], others], dim=1)
 
     def _filled(
         self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
