@@ -36,7 +36,7 @@ JOBS = 10_000
 CHILD = """
 import json, resource, sys, time
 from pathlib import Path
-from motion_transfer.batch.events import BatchFinished, JobFrames
+from motion_transfer.batch.events import BatchFinished, JobDone, JobFrames
 from motion_transfer.batch.run import BatchOptions, run_batch
 told = []
 listener = lambda event: told.append((time.perf_counter(), event))
@@ -45,9 +45,11 @@ end = next(event for _, event in told if isinstance(event, BatchFinished))
 drawn = [(moment, event.frame_count) for moment, event in told if isinstance(event, JobFrames)]
 peaks = [resource.getrusage(who).ru_maxrss // 1024
          for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-later = sum(count for moment, count in drawn if moment > drawn[0][0])
+# once as many jobs are done as there are workers, all of these are warm
+warm = sorted(moment for moment, event in told if isinstance(event, JobDone))[int(sys.argv[2]) - 1]
+later = sum(count for moment, count in drawn if moment > warm)
 print(json.dumps({"done": end.done_count, "maps": end.feature_maps, "scheduler": peaks[0],
-                  "worker": peaks[1], "rate": later / max(1e-9, drawn[-1][0] - drawn[0][0])}))
+                  "worker": peaks[1], "rate": later / max(1e-9, drawn[-1][0] - warm)}))
 """
 
 
@@ -81,7 +83,7 @@ def write_manifest(
 
 
 def run_manifest(path: Path, workers: int = 1) -> dict[str, Any]:
-    """Jobs done, feature maps, peaks of scheduler and worker in MiB, frames/s after the first."""
+    """Jobs done, feature maps, peaks of scheduler and worker in MiB, frames/s of warm workers."""
     command = [sys.executable, "-c", CHILD, str(path), str(workers)]
     result = subprocess.run(command, check=True, capture_output=True, text=True)
     return json.loads(result.stdout.splitlines()[-1])
