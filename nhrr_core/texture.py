@@ -81,8 +81,8 @@ def extract_texture(
 
 
 def shrink_texture(
-    texture: Float[Tensor, "B C T T"], visibility: Float[Tensor, "B 1 T T"], factor: int
-) -> tuple[Float[Tensor, "B C t t"], Float[Tensor, "B 1 t t"]]:
+    texture: Float[Tensor, "*B C T T"], visibility: Float[Tensor, "*B 1 T T"], factor: int
+) -> tuple[Float[Tensor, "*B C t t"], Float[Tensor, "*B 1 t t"]]:
     """A coarser partial texture: each texel the mean of those seen in its place, seen where any is.
 
     Args:

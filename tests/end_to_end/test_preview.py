@@ -245,10 +245,11 @@ def test_playing_moves_on_in_time_and_stops(page) -> None:
     page.keyboard.press("Space")
     until(lambda: shown_frame(page) >= 8)
     assert page.get_by_role("button", name="Pause").is_visible()
-    first = int(page.get_by_label("Frame", exact=True).input_value())
+    first, began = int(page.get_by_label("Frame", exact=True).input_value()), time.monotonic()
     page.wait_for_timeout(1000)
     passed = int(page.get_by_label("Frame", exact=True).input_value()) - first
-    assert 11 <= passed <= 19, "15 frames a second"
+    due = 15 * (time.monotonic() - began)  # frames a second; a busy machine waits for longer
+    assert 0.7 * due <= passed <= 1.3 * due
     page.keyboard.press("Space")
     frame = int(page.get_by_label("Frame", exact=True).input_value())
     shows(page, frame)

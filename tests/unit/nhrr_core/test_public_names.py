@@ -44,6 +44,7 @@ PUBLIC_NAMES = {
     "normalise_iuv",
     "perceptual_loss",
     "sample_features",
+    "shrink_texture",
     "texture_coordinates",
     "texture_loss",
 }
