@@ -5,7 +5,8 @@
 Prints, each against its own baseline:
 * `manifest`: reading and checking 10,000 jobs, and how long until the first of them begins;
 * `shared`: feature maps computed for 20 jobs of one source;
-* `overhead`: rendering chunks (decode, model, paste, encode) over the model alone, one worker;
+* `overhead`: rendering chunks (decode, model, paste, encode) over the model alone, one worker, each
+  with all cores; the model alone in as many threads as the engine's, and one call after the other;
 * `workers`: frames a second of the network, by how the cores are shared out between workers and
   their threads; decides the default number of workers;
 * `memory`: peak of the scheduler and of a worker, at 1 and 8 times the frames and the jobs.
@@ -22,6 +23,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -138,12 +140,14 @@ def shared(folder: Path, sizes: Sizes) -> None:
 
 def overhead(folder: Path, sizes: Sizes) -> None:
     import numpy as np
+    import torch
 
     from motion_transfer.media.work import WorkFolder
-    from motion_transfer.render.engine import TURN_TAKERS, Engine
+    from motion_transfer.render.engine import Engine
     from motion_transfer.render.events import ignore
     from motion_transfer.render.options import RenderOptions
     from motion_transfer.render.run import prepare
+    from motion_transfer.render.threads import one_thread
 
     options = RenderOptions(
         source=SOURCE,
@@ -160,25 +164,39 @@ def overhead(folder: Path, sizes: Sizes) -> None:
     side = renderer.working_size(window.side)
     iuv = reader.read(0, renderer.batch_size)
     crops = np.stack([window.cut(frame, side) for frame in iuv])
+    cores = torch.get_num_threads()
+    batches = range(sum(-(-(c.stop - c.start) // len(crops)) for c in prepared.plan.chunks))
+
+    def in_turn() -> None:
+        for _ in batches:
+            renderer.render(crops)
+
+    def side_by_side() -> None:
+        with one_thread(), ThreadPoolExecutor(cores) as threads:
+            for _ in threads.map(lambda _: renderer.render(crops), batches):
+                pass
+
+    def engine() -> None:
+        chunks = [(c, Path(temporary) / f"{c.index}.nut") for c in prepared.plan.chunks]
+        whole = Engine(prepared, reader=reader, renderer=renderer)
+        whole.render(chunks, cores, lambda _chunk, _path: None)
+
+    seconds: dict[Callable[[], None], list[float]] = {in_turn: [], side_by_side: [], engine: []}
     renderer.render(crops)
-    ratios, rates = [], []
-    for index in range(sizes.rounds):
-        began = time.perf_counter()
-        for chunk in prepared.plan.chunks:
-            for _ in range(chunk.start, chunk.stop, len(crops)):
-                renderer.render(crops)
-        alone = time.perf_counter() - began
-        began = time.perf_counter()
-        engine = Engine(prepared, reader=reader, renderer=renderer)
-        chunks = [(c, folder / f"{index}-{c.index}.nut") for c in prepared.plan.chunks]
-        engine.render(chunks, TURN_TAKERS, lambda _chunk, _path: None)
-        ratios.append((time.perf_counter() - began) / alone)
-        rates.append(sizes.frames / alone)
-    print(
-        f"overhead, {sizes.preset}: engine over model alone ({median(rates):.1f} frames/s), median"
-        f" {median(ratios):.3f} ({min(ratios):.3f} to {max(ratios):.3f})",
-        flush=True,
-    )
+    for _ in range(sizes.rounds):
+        for way, found in seconds.items():
+            with tempfile.TemporaryDirectory(dir=folder) as temporary:
+                began = time.perf_counter()
+                way()
+                found.append(time.perf_counter() - began)
+    for way, name in ((side_by_side, f"in {cores} threads"), (in_turn, "one call at a time")):
+        ratios = [ours / alone for ours, alone in zip(seconds[engine], seconds[way], strict=True)]
+        print(
+            f"overhead, {sizes.preset}: engine over model alone, {name}"
+            f" ({sizes.frames / median(seconds[way]):.1f} frames/s), median {median(ratios):.3f}"
+            f" ({min(ratios):.3f} to {max(ratios):.3f})",
+            flush=True,
+        )
 
 
 def workers(folder: Path, sizes: Sizes) -> None:

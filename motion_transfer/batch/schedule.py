@@ -23,7 +23,6 @@ from motion_transfer.media.publish import check_destination
 from motion_transfer.media.work import WorkFolder, was_published
 
 POLL_SECONDS = 0.5  # how soon a signal is heeded
-TURN_TAKING_CHUNKS = 2  # one task's, where the network is the bottleneck: see render.engine
 SPARE_JOBS = 2  # planned ahead, beyond one for each worker
 
 
@@ -154,8 +153,8 @@ class Scheduler(Outcomes):
             active.todo.rotate(-1)
         else:
             active.todo = type(active.todo)(sorted(active.todo, key=lambda chunk: chunk.index))
-        takes_turns = active.outline is not None and active.outline.takes_turns
-        count = min(len(active.todo), TURN_TAKING_CHUNKS if takes_turns else 1)
+        wanted = active.outline.chunks_at_once if active.outline else 1
+        count = min(len(active.todo), wanted)
         chunks = [active.todo.popleft() for _ in range(count)]
         self._last[place] = active.scan_name, chunks[-1].start
         places = [(c.index, active.work.temporary(c.piece), c.piece) for c in chunks]

@@ -60,7 +60,7 @@ class Outline:
     frame_count: int
     duration_seconds: float
     renderer: str
-    takes_turns: bool
+    chunks_at_once: int
     output_key: str
     note: str
 
@@ -128,6 +128,7 @@ def prepare(
         from: chunks are keyed by what its files hold now.
     """
     from motion_transfer.media.formats import choose_format
+    from motion_transfer.render.engine import CHUNKS_AT_ONCE
     from motion_transfer.render.events import ignore
     from motion_transfer.render.missing import describe_missing
     from motion_transfer.render.prepare import (
@@ -154,7 +155,7 @@ def prepare(
         len(plan.frames),
         float(len(plan.frames) / plan.frame_rate),
         recipe.name,
-        recipe.name == "nhrr",
+        CHUNKS_AT_ONCE if recipe.name == "nhrr" else 1,
         output_key(run),
         describe_missing(plan.frames, plan.first, plan.frame_rate),
     )
@@ -177,9 +178,11 @@ def render(
         chunks: index, a temporary path, and the segment's name in `folder`.
     Raises: InputError for a driver that is damaged or changed; RenderError; OutputError.
     """
+    import torch
+
     from motion_transfer.media.publish import explain_disk_errors
     from motion_transfer.media.work import publish_piece
-    from motion_transfer.render.engine import TURN_TAKERS, Engine
+    from motion_transfer.render.engine import Engine
     from motion_transfer.render.sheet import ContactSheet
 
     run: Prepared = WARM.get(f"run {name}", lambda: pickle.loads(prepared()))
@@ -204,7 +207,7 @@ def render(
         plan_chunks = run.plan.chunks
         engine.render(
             [(plan_chunks[index], path) for index, path, _ in chunks],
-            TURN_TAKERS if renderer.takes_turns else 1,
+            torch.get_num_threads(),
             finish,
         )
     return digests

@@ -1,19 +1,22 @@
 """The engine: chunks of a driver, rendered by threads, each to its own segment.
 
-A thread takes a chunk from decoding to encoding. A renderer that fills the machine by itself takes
-turns, so that one thread decodes and encodes while another's batch is in the network. Nothing is
-queued: memory is bounded by the number of threads, not by the length of the driver.
+A thread takes a chunk from decoding to encoding. Where a picture takes long, other threads draw it,
+a batch each, while the chunks' threads decode and encode. Few batches are on their way at a time:
+memory is bounded by the number of threads, not by the length of the driver.
 """
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError, RenderError
 from motion_transfer.media.segments import open_segment
@@ -23,10 +26,12 @@ from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
 from motion_transfer.render.prepare import Prepared
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.sheet import ContactSheet
+from motion_transfer.render.threads import one_thread
 from motion_transfer.render.window import Window
 
-TURN_TAKERS = 2  # threads for a renderer that takes turns: one's batch is drawn while another
-# decodes and encodes
+CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's batches are on the way
+
+Pixels = UInt8[np.ndarray, "B S S 4"]
 
 
 class StoppedError(Exception):
@@ -51,7 +56,8 @@ class Engine:
         self._renderer = renderer
         self._sheet = sheet
         self._listener = listener
-        self._draw = renderer.render
+        self._drawers: ThreadPoolExecutor | None = None
+        self._ahead = 0  # batches of a chunk on their way, beyond the one that is wanted next
         self._stop = threading.Event()
 
     def render(
@@ -62,16 +68,20 @@ class Engine:
     ) -> None:
         """Render chunks, each to its path; `finished` is called, by any thread, as they complete.
 
+        Args:
+            threads: that draw.
         Raises: the first thread's error, after all threads have stopped.
         """
+        drawers = {"core": threads, "device": 1, "nothing": 0}[self._renderer.occupies]
         with (
-            ThreadPoolExecutor(1, thread_name_prefix="renderer") as turns,
-            ThreadPoolExecutor(threads, thread_name_prefix="chunk") as pool,
+            one_thread(),
+            ThreadPoolExecutor(max(1, drawers), thread_name_prefix="draw") as draw,
+            ThreadPoolExecutor(
+                CHUNKS_AT_ONCE if drawers else threads, thread_name_prefix="chunk"
+            ) as pool,
         ):
-            if self._renderer.takes_turns:
-                # one thread, not a lock: torch keeps a team of threads for each one that calls it,
-                # and teams that wait for work take the cores from the one that has some
-                self._draw = lambda crops: turns.submit(self._renderer.render, crops).result()
+            if drawers:
+                self._drawers, self._ahead = draw, drawers
             futures = [
                 pool.submit(self._render_chunk, chunk, path, finished) for chunk, path in chunks
             ]
@@ -81,6 +91,7 @@ class Engine:
                     future.result()
             except BaseException:
                 self._stop.set()
+                draw.shutdown(wait=True, cancel_futures=True)
                 pool.shutdown(wait=True, cancel_futures=True)
                 raise
 
@@ -107,22 +118,44 @@ class Engine:
     def _render_batches(self, chunk: Chunk) -> Iterator[list[Image]]:
         """Output frames of a chunk, a batch at a time; batches begin where chunk or shot does."""
         frames = self._read(chunk)
+        on_their_way: deque[Callable[[], list[Image]]] = deque()
         for shot in self._plan.shots_in(chunk):
             for start in range(shot.start, shot.stop, self._renderer.batch_size):
                 count = min(self._renderer.batch_size, shot.stop - start)
+                batch = list(islice(frames, count))
+                on_their_way.append(self._begin_batch(batch, start, shot.window))
+                if len(on_their_way) > self._ahead:
+                    yield on_their_way.popleft()()
                 if self._stop.is_set():
                     raise StoppedError
-                yield self._render_batch(list(islice(frames, count)), start, shot.window)
+        for finish in on_their_way:
+            yield finish()
 
-    def _render_batch(self, batch: list[Image], start: int, window: Window) -> list[Image]:
-        """Output frames from those of the driver, the first of which makes frame `start`."""
-        canvas = self._prepared.canvas
+    def _begin_batch(
+        self, batch: list[Image], start: int, window: Window
+    ) -> Callable[[], list[Image]]:
+        """Have driver frames drawn, the first of which makes frame `start`; what waits for it."""
         size = self._renderer.working_size(window.side)
         crops = np.zeros((self._renderer.batch_size, size, size, 3), np.uint8)
         for slot, iuv in enumerate(batch):
             crops[slot] = window.cut(iuv, size)
+        drawn = partial(self._renderer.render, crops)
+        if self._drawers is not None:
+            drawn = self._drawers.submit(drawn).result
+        return partial(self._finish_batch, batch, start, window, crops, drawn)
+
+    def _finish_batch(
+        self,
+        batch: list[Image],
+        start: int,
+        window: Window,
+        crops: UInt8[np.ndarray, "B S S 3"],
+        drawn: Callable[[], Pixels],
+    ) -> list[Image]:
+        """Output frames of a batch."""
+        canvas = self._prepared.canvas
         try:
-            results = self._draw(crops)
+            results = drawn()
         except (RuntimeError, MemoryError) as error:  # what torch raises, out of memory too
             first = self._plan.first + start
             raise RenderError(

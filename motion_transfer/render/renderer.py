@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from jaxtyping import UInt8
+
+Occupied = Literal["core", "device", "nothing"]
 
 
 class Renderer(Protocol):
@@ -14,12 +16,14 @@ class Renderer(Protocol):
     Attributes:
         name: what `mt run` reports.
         batch_size: frames a call; the engine pads the last batch of a chunk to it.
-        takes_turns: a call keeps the whole machine busy, so calls wait for each other.
+        occupies: what a call keeps busy for long: a `core`, so that there are threads for calls
+            alone, one for each worker; the `device`, so that one thread makes them; or `nothing`,
+            and whoever wants a picture draws it.
     """
 
     name: str
     batch_size: int
-    takes_turns: bool
+    occupies: Occupied
 
     def working_size(self, window_side: int) -> int:
         """Side of the crops this renderer wants, px, for a window of that side in the driver."""

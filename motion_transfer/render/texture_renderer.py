@@ -8,6 +8,7 @@ import torch
 from jaxtyping import UInt8
 
 from motion_transfer.render.completion import complete_texture
+from motion_transfer.render.renderer import Occupied
 from motion_transfer.render.source import Source
 from nhrr_core import load_uv_layout, sample_features
 from nhrr_core.iuv import PART_COUNT
@@ -25,7 +26,7 @@ class TextureRenderer:
 
     name = "texture"
     batch_size = 1
-    takes_turns = False
+    occupies: Occupied = "nothing"
 
     def __init__(self, table: UInt8[np.ndarray, "25 256 256 4"]) -> None:
         self._table = table.view(np.uint32).reshape(-1)
