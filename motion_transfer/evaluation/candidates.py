@@ -15,6 +15,7 @@ from motion_transfer.evaluation.results_folder import ResultsFolder
 from motion_transfer.media.image import Photo
 from motion_transfer.media.work import digest_of
 from motion_transfer.render.compose import make_background, paste
+from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import Person, occupancy
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.source import Source, unfold
@@ -41,9 +42,11 @@ class OpenedSource:
     def prepare(self, texels: int) -> Source:
         """What renderers start from, with a texture of `texels` x `texels`."""
         if texels not in self._prepared:
-            texture = unfold(self._photo, self.picture.iuv, ALL_PARTS, texels)
+            iuv, alpha = self.picture.iuv, self.picture.alpha
+            texture = unfold(self._photo, iuv, ALL_PARTS, texels)
             self._prepared[texels] = Source(
-                self._photo, self.picture.iuv, self._photo.path, *texture
+                *(self._photo, iuv, self._photo.path, *texture),
+                clearance=clearance_of(iuv, alpha),
             )
         return self._prepared[texels]
 
