@@ -25,6 +25,7 @@ def test_defaults_are_the_papers() -> None:
         "visibility_input": True,
         "prefilled": False,
         "colour_shortcut": False,
+        "clearance": False,
         "colour_margin": False,
     }
 
