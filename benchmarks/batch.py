@@ -147,7 +147,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
     from motion_transfer.render.events import ignore
     from motion_transfer.render.options import RenderOptions
     from motion_transfer.render.run import prepare
-    from motion_transfer.render.threads import one_thread
+    from motion_transfer.render.threads import one_torch_thread
 
     options = RenderOptions(
         source=SOURCE,
@@ -172,7 +172,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
             renderer.render(crops)
 
     def side_by_side() -> None:
-        with one_thread(), ThreadPoolExecutor(cores) as threads:
+        with one_torch_thread(), ThreadPoolExecutor(cores) as threads:
             for _ in threads.map(lambda _: renderer.render(crops), batches):
                 pass
 

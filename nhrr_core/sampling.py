@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from nhrr_core.errors import ShapeError
-from nhrr_core.uv_layout import chart_index
+from nhrr_core.uv_layout import texture_coordinates
 
 TINY = 1e-6
 
@@ -37,11 +37,11 @@ def sample_features(
     for number, own_map in enumerate(feature_map.split(1)):
         shown = slice(None) if maps == 1 else slice(number, number + 1)
         index, row, column = (iuv[shown, 0] > 0).nonzero(as_tuple=True)  # often a tenth of it
-        part, u, v = iuv[shown][index, :, row, column].long().unbind(1)
-        grid = charts.view(-1, 2)[chart_index(part, u, v)] * 2 - 1
+        body = iuv[shown][index, :, row, column].T[None, :, None]  # 1 x 3 x 1 x N
+        grid = texture_coordinates(body, charts) * 2 - 1
         sampled = F.grid_sample(
             own_map,
-            grid.to(feature_map.dtype)[None, None],
+            grid.to(feature_map.dtype),
             mode="bilinear",
             padding_mode="border",
             align_corners=False,

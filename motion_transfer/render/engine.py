@@ -26,7 +26,7 @@ from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
 from motion_transfer.render.prepare import Prepared
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.sheet import ContactSheet
-from motion_transfer.render.threads import one_thread
+from motion_transfer.render.threads import one_torch_thread
 from motion_transfer.render.window import Window
 
 CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's batches are on the way
@@ -74,7 +74,7 @@ class Engine:
         """
         drawers = {"core": threads, "device": 1, "nothing": 0}[self._renderer.occupies]
         with (
-            one_thread(),
+            one_torch_thread(),
             ThreadPoolExecutor(max(1, drawers), thread_name_prefix="draw") as draw,
             ThreadPoolExecutor(
                 CHUNKS_AT_ONCE if drawers else threads, thread_name_prefix="chunk"

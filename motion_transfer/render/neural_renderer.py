@@ -14,7 +14,7 @@ from torch import Tensor
 from motion_transfer.render.person import disc, occupancy
 from motion_transfer.render.renderer import Occupied
 from motion_transfer.render.source import Source
-from motion_transfer.render.threads import one_thread
+from motion_transfer.render.threads import one_torch_thread
 from nhrr_core import FastRenderNet, NeuralReRenderer, RenderNet
 
 MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leave the IUV
@@ -41,7 +41,7 @@ class PreparedNetwork:
             blank = torch.zeros(self.batch_size, 3, side, side, dtype=torch.uint8)
             map_side = self.config.finest_texture
             shape = (1, self.config.map_channels, map_side, map_side)
-            with one_thread():
+            with one_torch_thread():
                 self.draw(torch.zeros(shape, device=self.device), blank)
 
     def draw(self, feature_map: Tensor, target: Tensor) -> Tensor:
@@ -110,7 +110,7 @@ def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
     runs; RenderNet's do not.
     """
     device = next(model.parameters()).device
-    with one_thread(), torch.inference_mode():
+    with one_torch_thread(), torch.inference_mode():
         clearance = None if source.clearance is None else source.clearance.to(device)
         return model.encode_texture(
             source.texture.to(device), source.visibility.to(device), clearance

@@ -9,7 +9,7 @@ import torch
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
+def one_torch_thread() -> Iterator[None]:
     """Inside, torch computes with one thread a call: here, and in threads that begin inside."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)

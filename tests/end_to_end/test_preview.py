@@ -248,8 +248,8 @@ def test_playing_moves_on_in_time_and_stops(page) -> None:
     first, began = int(page.get_by_label("Frame", exact=True).input_value()), time.monotonic()
     page.wait_for_timeout(1000)
     passed = int(page.get_by_label("Frame", exact=True).input_value()) - first
-    due = 15 * (time.monotonic() - began)  # frames a second; a busy machine waits for longer
-    assert 0.7 * due <= passed <= 1.3 * due
+    rate = passed / (time.monotonic() - began)  # by the clock: a busy machine waits for longer
+    assert 11 <= rate <= 19, "15 frames a second"
     page.keyboard.press("Space")
     frame = int(page.get_by_label("Frame", exact=True).input_value())
     shows(page, frame)
