@@ -22,13 +22,12 @@ from motion_transfer.render.source import Source, unfold
 from motion_transfer.render.window import plan_window
 from motion_transfer.training.pairs import Pair
 from motion_transfer.training.pictures import PersonPicture
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.iuv import ALL_PARTS
 
 Image = UInt8[np.ndarray, "H W 3"]
 Draw = Callable[[Pair, PersonPicture], Image]
 
 TEXTURE_TEXELS = 256
-ALL_PARTS = tuple(range(1, PART_COUNT + 1))
 
 
 class OpenedSource:
@@ -42,12 +41,10 @@ class OpenedSource:
     def prepare(self, texels: int) -> Source:
         """What renderers start from, with a texture of `texels` x `texels`."""
         if texels not in self._prepared:
-            iuv, alpha = self.picture.iuv, self.picture.alpha
-            texture = unfold(self._photo, iuv, ALL_PARTS, texels)
-            self._prepared[texels] = Source(
-                *(self._photo, iuv, self._photo.path, *texture),
-                clearance=clearance_of(iuv, alpha),
-            )
+            photo, iuv = self._photo, self.picture.iuv
+            texture = unfold(photo, iuv, ALL_PARTS, texels)
+            clearance = clearance_of(photo, iuv, ALL_PARTS)
+            self._prepared[texels] = Source(photo, iuv, photo.path, *texture, clearance=clearance)
         return self._prepared[texels]
 
 

@@ -8,41 +8,89 @@ import torch
 from jaxtyping import Bool, Float, Float32, Int64, UInt8
 from torch import Tensor
 
-from motion_transfer.render.person import occupancy
+from motion_transfer.media.image import Photo
+from motion_transfer.render.person import disc, occupancy
 from nhrr_core import load_uv_layout, unfold_clearance
 from nhrr_core.clearance import CLEARANCE_SIZE
 from nhrr_core.config import CLEARANCE_CHANNELS
-from nhrr_core.iuv import PART_COUNT
 
-ALL_PARTS = tuple(range(1, PART_COUNT + 1))
 ROOM_SHARE = 0.25  # of the body's longer side: nobody's clothes reach further
+WORKING_SIDE = 256  # px of the body's longer side: more would not show on CLEARANCE_SIZE texels
 SOLID_ALPHA = 128  # of 255
 SMOOTHING_PX = 1.5  # along the outline, whose pixels see the person's end each for itself
 
+WEAR_SHARE = 0.12  # of the body's longer side: what lies farther away shows the backdrop
+PLAIN_SHARE = 0.95  # of what lies beyond has the backdrop's colour, or there is none
+ABOUT = 20  # of 255, in the channel that differs most
+DARKEST_SHADOW = 0.6  # of the backdrop's light
+FEWEST_BACKDROP_PIXELS = 200
+
 
 def clearance_of(
+    photo: Photo,
     iuv: UInt8[np.ndarray, "H W 3"],
-    alpha: UInt8[np.ndarray, "H W"] | None,
-    parts: tuple[int, ...] = ALL_PARTS,
+    parts: tuple[int, ...],
+    *,
+    alpha: UInt8[np.ndarray, "H W"] | None = None,
 ) -> Float[Tensor, "1 2 128 128"]:
-    """The clearance of some parts of a person, as the network takes it.
+    """The clearance of some parts of a person, see `unfold_clearance`; 0 where it is not known.
 
     Args:
-        alpha: None: nothing is known of it.
+        alpha: says where the person ends; None: the photo's own alpha, or else a plain backdrop.
     """
-    if alpha is None or not iuv[..., 0].any():
-        return torch.zeros(1, CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
+    alpha = photo.alpha if alpha is None else alpha
+    unknown = torch.zeros(1, CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
+    if not iuv[..., 0].any():
+        return unknown
     x, y, width, height = cv2.boundingRect(occupancy(iuv))
     room = round(max(width, height) * ROOM_SHARE)
     near = np.s_[max(0, y - room) : y + height + room, max(0, x - room) : x + width + room]
-    own = np.ascontiguousarray(iuv[near])
-    clearance, measured = measure_clearance(own, alpha[near])
+    shrink = min(1, WORKING_SIDE / max(width, height))
+    own = _shrink(iuv[near], shrink, cv2.INTER_NEAREST_EXACT)
+    if alpha is None:
+        rgb = _shrink(photo.rgb[near], shrink, cv2.INTER_AREA)
+        alpha = stand_out(rgb, occupancy(own), max(width, height) * shrink)
+    else:
+        alpha = _shrink(alpha[near], shrink, cv2.INTER_AREA)
+    if alpha is None:
+        return unknown
+    clearance, measured = measure_clearance(own, alpha)
     return unfold_clearance(
         torch.from_numpy(clearance)[None, None],
         torch.from_numpy(measured & np.isin(own[..., 0], parts))[None, None],
         torch.from_numpy(own.transpose(2, 0, 1).copy())[None],
         load_uv_layout().charts,
     )
+
+
+def stand_out(
+    rgb: UInt8[np.ndarray, "H W 3"], body: UInt8[np.ndarray, "H W"], longer_side: float
+) -> UInt8[np.ndarray, "H W"] | None:
+    """Alpha of a person before a plain backdrop: the body, and what differs from the backdrop.
+
+    Plain is one colour that may change evenly across the photo, as a studio's light does,
+    with the person's shadow on it.
+
+    Args:
+        body: 1 where IUV shows it.
+        longer_side: the body's, px.
+    Returns: None if there is no backdrop to be seen, or not a plain one.
+    """
+    beyond = cv2.dilate(body, disc(longer_side * WEAR_SHARE)) == 0
+    if np.count_nonzero(beyond) < FEWEST_BACKDROP_PIXELS:
+        return None
+    row, column = np.indices(body.shape, np.float32) / longer_side
+    plane = np.stack([row, column, np.ones_like(row)], axis=-1)
+    shade = np.linalg.lstsq(plane[beyond], rgb[beyond].astype(np.float32))[0]
+    backdrop = plane @ shade
+    light = (rgb * backdrop).sum(2) / np.maximum((backdrop**2).sum(2), 1)
+    lit = backdrop * light.clip(DARKEST_SHADOW, 1)[..., None]
+    differs = np.abs(rgb - lit).max(2) > ABOUT
+    if differs[beyond].mean() > 1 - PLAIN_SHARE:
+        return None
+    _, region = cv2.connectedComponents((differs | (body > 0)).astype(np.uint8))
+    own = np.unique(region[body > 0])
+    return np.isin(region, own).astype(np.uint8) * 255
 
 
 def measure_clearance(
@@ -68,6 +116,15 @@ def measure_clearance(
     weight = cv2.GaussianBlur(outline.astype(np.float32), kernel, SMOOTHING_PX)
     total = cv2.GaussianBlur(np.where(outline, clearance, 0), kernel, SMOOTHING_PX)
     return np.where(outline, total / np.maximum(weight, 1e-6), 0).astype(np.float32), outline
+
+
+def _shrink(
+    image: UInt8[np.ndarray, "*shape"], factor: float, interpolation: int
+) -> UInt8[np.ndarray, "*shape"]:
+    if factor == 1:
+        return np.ascontiguousarray(image)
+    size = max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor))
+    return cv2.resize(image, size, interpolation=interpolation)
 
 
 def _nearest(

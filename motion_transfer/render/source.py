@@ -21,7 +21,7 @@ from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
 from motion_transfer.render.photo_person import COVERS, SourcePerson, estimate_person
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
-from nhrr_core.iuv import PART_COUNT, PART_NAMES
+from nhrr_core.iuv import ALL_PARTS, PART_NAMES
 
 SMALLEST_VISIBLE_SHARE = 0.01  # of the texels; a frontal half-length portrait shows about 0.2
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
@@ -66,9 +66,9 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
     iuv_path = options.source_iuv or find_iuv_beside(options.source)
     person = _find_person(photo, iuv_path, options.person, options, "source")
     taken = {part for garment in options.garments for part in garment.parts}
-    kept = tuple(part for part in range(1, PART_COUNT + 1) if part not in taken)
+    kept = tuple(part for part in ALL_PARTS if part not in taken)
     layers = [unfold(photo, person.iuv, kept, texture_size, alpha=person.alpha)]
-    clearances = [clearance_of(person.iuv, _alpha(photo, person), kept)]
+    clearances = [clearance_of(photo, person.iuv, kept, alpha=person.alpha)]
     for number, garment in enumerate(options.garments):
         later = {part for other in options.garments[number + 1 :] for part in other.parts}
         layer, clearance = _unfold_garment(garment, later, options, texture_size)
@@ -83,10 +83,6 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
             " use a larger photo, or choose another --person"
         )
     return Source(photo, person.iuv, iuv_path, texture, visibility, person.alpha, merged)
-
-
-def _alpha(photo: Photo, person: SourcePerson) -> UInt8[np.ndarray, "H W"] | None:
-    return photo.alpha if person.alpha is None else person.alpha
 
 
 def _find_person(
@@ -212,7 +208,7 @@ def _unfold_garment(
             f"garment {garment.photo} shows none of {', '.join(PART_NAMES[p] for p in parts)};"
             f" it shows {shown}"
         )
-    return (texture, visibility), clearance_of(person.iuv, _alpha(photo, person), parts)
+    return (texture, visibility), clearance_of(photo, person.iuv, parts, alpha=person.alpha)
 
 
 def read_person(
