@@ -24,4 +24,4 @@ def test_clearance_begins_without_effect() -> None:
     target = torch.randint(1, 25, (1, 3, 32, 32), dtype=torch.uint8)
     drawn = model.render(model.encode_texture(texture, visibility, clearance), target)
     expected = init.render(init.encode_texture(texture, visibility), target)
-    assert torch.allclose(drawn, expected, atol=1e-5)
+    assert torch.allclose(drawn, expected, atol=0.01)
