@@ -89,7 +89,7 @@ class ModelConfig:
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> ModelConfig:
-        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 22.0).
+        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 22.4).
 
         Raises: ConfigError on an unknown name.
         """
@@ -159,5 +159,6 @@ PRESETS = {
         prefilled=True,
         colour_shortcut=True,
         colour_margin=True,
+        clearance=True,
     ),
 }

@@ -34,7 +34,12 @@ def test_presets() -> None:
     assert set(PRESETS) == {"paper", "lite"}
     assert ModelConfig.preset("paper") == ModelConfig()
     assert ModelConfig.preset("lite") == ModelConfig(
-        feature_width=32, render_width=32, prefilled=True, colour_shortcut=True, colour_margin=True
+        feature_width=32,
+        render_width=32,
+        prefilled=True,
+        colour_shortcut=True,
+        colour_margin=True,
+        clearance=True,
     )
 
 
