@@ -3,6 +3,7 @@
 Tensors in, tensors out: no files, no devices chosen, nothing printed.
 """
 
+from nhrr_core.clearance import unfold_clearance
 from nhrr_core.config import PRESETS, VARIANTS, ModelConfig
 from nhrr_core.discriminator import Discriminator
 from nhrr_core.errors import ConfigError, IuvError, NhrrError, ShapeError
@@ -76,4 +77,5 @@ __all__ = [
     "shrink_texture",
     "texture_coordinates",
     "texture_loss",
+    "unfold_clearance",
 ]

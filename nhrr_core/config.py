@@ -13,6 +13,7 @@ VARIANTS: tuple[str, ...] = get_args(Variant)
 
 COLOUR_CHANNELS = 3
 IUV_CHANNELS = 3
+CLEARANCE_CHANNELS = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +32,7 @@ class ModelConfig:
     image's first three show through its drawing, as in Vid2Vid (Wang et al., NeurIPS 2018, Sec. 3).
     `colour_margin` carries those three beyond the body's outline (`spread_colours`), where clothes
     and hair are.
+    `clearance` tells RenderNet how far those stand off the body in the source (`unfold_clearance`).
 
     Attributes:
         variant: `full`; `no-int` (same networks, trained without the texture loss); `ip` (the map
@@ -43,7 +45,7 @@ class ModelConfig:
         texture_size: side of the UV texture in texels, a multiple of 16.
         image_size: side of the image RenderNet works on in pixels, a multiple of 2**down_blocks.
         alpha: RenderNet has a fourth output, the person's coverage.
-        visibility_input, prefilled, colour_shortcut, colour_margin: see above.
+        visibility_input, prefilled, colour_shortcut, colour_margin, clearance: see above.
     """
 
     variant: Variant = "full"
@@ -59,11 +61,15 @@ class ModelConfig:
     prefilled: bool = False
     colour_shortcut: bool = False
     colour_margin: bool = False
+    clearance: bool = False
 
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
             raise ConfigError(f"variant is {self.variant!r}; supported are {', '.join(VARIANTS)}")
-        for name in ("alpha", "visibility_input", "prefilled", "colour_shortcut", "colour_margin"):
+        for name in (
+            *("alpha", "visibility_input", "prefilled"),
+            *("colour_shortcut", "colour_margin", "clearance"),
+        ):
             if not isinstance(getattr(self, name), bool):
                 raise ConfigError(f"{name} is {getattr(self, name)!r}; it must be true or false")
         for name, low, high, multiple in (
@@ -83,7 +89,7 @@ class ModelConfig:
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> ModelConfig:
-        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 22.0).
+        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 22.4).
 
         Raises: ConfigError on an unknown name.
         """
@@ -120,9 +126,14 @@ class ModelConfig:
         return COLOUR_CHANNELS + int(self.visibility_input) + int(self.prefilled)
 
     @property
-    def map_channels(self) -> int:
-        """Channels of the feature map: d, or 3 where the map is a colour texture."""
+    def feature_outputs(self) -> int:
+        """Channels that FeatureNet writes: d, or 3 where the map is a colour texture."""
         return self.feature_channels if self.variant in ("full", "no-int") else COLOUR_CHANNELS
+
+    @property
+    def map_channels(self) -> int:
+        """Channels of the feature map: FeatureNet's, and what is carried past it."""
+        return self.feature_outputs + CLEARANCE_CHANNELS * self.clearance
 
     @property
     def render_inputs(self) -> int:
@@ -148,5 +159,6 @@ PRESETS = {
         prefilled=True,
         colour_shortcut=True,
         colour_margin=True,
+        clearance=True,
     ),
 }

@@ -15,6 +15,8 @@ from nhrr_core.errors import IuvError, ShapeError
 
 PART_COUNT = 24
 
+ALL_PARTS = tuple(range(1, PART_COUNT + 1))
+
 PART_NAMES: tuple[str, ...] = (
     "background",
     "torso-back",

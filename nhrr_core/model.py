@@ -7,6 +7,13 @@ import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
+from nhrr_core.clearance import (
+    CLEARANCE_SIZE,
+    UNIT_PIXELS,
+    UNIT_TEXELS,
+    pixels_per_texel,
+    spread_clearance,
+)
 from nhrr_core.config import COLOUR_CHANNELS, ModelConfig
 from nhrr_core.errors import ShapeError
 from nhrr_core.feature_net import FeatureNet
@@ -51,7 +58,7 @@ class NeuralReRenderer(nn.Module):
         self.feature_net = (
             FeatureNet(
                 inputs=config.feature_inputs,
-                outputs=config.map_channels,
+                outputs=config.feature_outputs,
                 width=config.feature_width,
             )
             if config.has_feature_net
@@ -66,7 +73,7 @@ class NeuralReRenderer(nn.Module):
         )
         layout = load_uv_layout()
         tables = {"charts": layout.charts.clone()}
-        if config.prefilled:
+        if config.prefilled or config.clearance:
             for name in ("side_twin", "depth_twin", "position"):
                 tables[name] = getattr(layout, name).clone()
             tables["surroundings"] = measure_surroundings(layout.position)
@@ -82,14 +89,33 @@ class NeuralReRenderer(nn.Module):
         )
 
     def encode_texture(
-        self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
+        self,
+        texture: Float[Tensor, "B 3 T T"],
+        visibility: Float[Tensor, "B 1 T T"],
+        clearance: Float[Tensor, "B 2 128 128"] | None = None,
     ) -> Float[Tensor, "B D T T"]:
         """The UV feature map of a partial texture; for the warp variants, that texture itself.
 
         With `config.colour_shortcut` the texture may be a multiple of `config.texture_size`:
         FeatureNet works at its own size, and what it adds to the colours is added to the finer.
+
+        Args:
+            clearance: `unfold_clearance`'s, with `config.clearance`; None: nothing is known of it.
         Raises: ShapeError if its side is not a multiple of 16.
         """
+        feature_map = self._complete(texture, visibility)
+        if not self.config.clearance:
+            return feature_map
+        if clearance is None:
+            clearance = texture.new_zeros(len(texture), 2, CLEARANCE_SIZE, CLEARANCE_SIZE)
+        carried = spread_clearance(
+            *self._mirror_and_fill(*clearance.split(1, 1)), texture.shape[-1]
+        )
+        return torch.cat([feature_map, carried], dim=1)
+
+    def _complete(
+        self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
+    ) -> Float[Tensor, "B D T T"]:
         if self.feature_net is None:
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
@@ -114,17 +140,26 @@ class NeuralReRenderer(nn.Module):
         """What FeatureNet reads: the texture, filled if it is to be, and what is known of it."""
         known = [visibility] if self.config.visibility_input else []
         if self.config.prefilled:
-            twins = self.side_twin, self.depth_twin
-            texture, shown = mirror_texture(texture, visibility, *twins)
-            texture = fill_texture(texture, shown, self.position, self.surroundings)
+            texture, shown = self._mirror_and_fill(texture, visibility)
             known.append(shown)
         return [texture, *known]
+
+    def _mirror_and_fill(
+        self, texture: Float[Tensor, "B C T T"], visibility: Float[Tensor, "B 1 T T"]
+    ) -> tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]:
+        """The texture without holes, and 1 where it or its mirror image was seen."""
+        texture, shown = mirror_texture(texture, visibility, self.side_twin, self.depth_twin)
+        return fill_texture(texture, shown, self.position, self.surroundings), shown
 
     def feature_image(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
     ) -> Float[Tensor, "B C H W"]:
         """What RenderNet sees: the sampled map, and the target IUV for `warp-cond`."""
         features = sample_features(feature_map, target_iuv, self.charts)
+        if self.config.clearance:
+            others, clearance, known = features.tensor_split([-2, -1], dim=1)
+            unit = pixels_per_texel(target_iuv, self.charts) * (UNIT_TEXELS / UNIT_PIXELS)
+            features = torch.cat([others, clearance * unit[:, None, None, None], known], dim=1)
         if self.config.variant == "warp-cond":
             return torch.cat([features, normalise_iuv(target_iuv)], dim=1)
         return features

@@ -15,19 +15,19 @@ from motion_transfer.evaluation.results_folder import ResultsFolder
 from motion_transfer.media.image import Photo
 from motion_transfer.media.work import digest_of
 from motion_transfer.render.compose import make_background, paste
+from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import Person, occupancy
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.source import Source, unfold
 from motion_transfer.render.window import plan_window
 from motion_transfer.training.pairs import Pair
 from motion_transfer.training.pictures import PersonPicture
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.iuv import ALL_PARTS
 
 Image = UInt8[np.ndarray, "H W 3"]
 Draw = Callable[[Pair, PersonPicture], Image]
 
 TEXTURE_TEXELS = 256
-ALL_PARTS = tuple(range(1, PART_COUNT + 1))
 
 
 class OpenedSource:
@@ -41,10 +41,10 @@ class OpenedSource:
     def prepare(self, texels: int) -> Source:
         """What renderers start from, with a texture of `texels` x `texels`."""
         if texels not in self._prepared:
-            texture = unfold(self._photo, self.picture.iuv, ALL_PARTS, texels)
-            self._prepared[texels] = Source(
-                self._photo, self.picture.iuv, self._photo.path, *texture
-            )
+            photo, iuv = self._photo, self.picture.iuv
+            texture = unfold(photo, iuv, ALL_PARTS, texels)
+            clearance = clearance_of(photo, iuv, ALL_PARTS)
+            self._prepared[texels] = Source(photo, iuv, photo.path, *texture, clearance=clearance)
         return self._prepared[texels]
 
 

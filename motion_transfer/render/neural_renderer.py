@@ -111,7 +111,10 @@ def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
     """
     device = next(model.parameters()).device
     with one_torch_thread(), torch.inference_mode():
-        return model.encode_texture(source.texture.to(device), source.visibility.to(device)).cpu()
+        clearance = None if source.clearance is None else source.clearance.to(device)
+        return model.encode_texture(
+            source.texture.to(device), source.visibility.to(device), clearance
+        ).cpu()
 
 
 def grow_mask(iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S"]:

@@ -17,10 +17,11 @@ from motion_transfer.media.iuv_image import ChannelOrder
 from motion_transfer.media.iuv_stream import read_single_iuv
 from motion_transfer.render.beside import find_iuv_beside
 from motion_transfer.render.options import Garment, RenderOptions
+from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
 from motion_transfer.render.photo_person import COVERS, SourcePerson, estimate_person
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
-from nhrr_core.iuv import PART_COUNT, PART_NAMES
+from nhrr_core.iuv import ALL_PARTS, PART_NAMES
 
 SMALLEST_VISIBLE_SHARE = 0.01  # of the texels; a frontal half-length portrait shows about 0.2
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
@@ -43,6 +44,7 @@ class Source:
         texture: 1 x 3 x T x T in [-1, 1], 0 where nothing is seen.
         visibility: 1 x 1 x T x T, 1 where the texture is seen.
         alpha: how much of each pixel is the person, 0..255, where the IUV was estimated.
+        clearance: of clothes and hair, see `nhrr_core.unfold_clearance`; 0 where it is not known.
     """
 
     photo: Photo
@@ -51,6 +53,7 @@ class Source:
     texture: Float[Tensor, "1 3 T T"]
     visibility: Float[Tensor, "1 1 T T"]
     alpha: UInt8[np.ndarray, "H W"] | None = None
+    clearance: Float[Tensor, "1 2 128 128"] | None = None
 
 
 def prepare_source(options: RenderOptions, texture_size: int) -> Source:
@@ -63,19 +66,23 @@ def prepare_source(options: RenderOptions, texture_size: int) -> Source:
     iuv_path = options.source_iuv or find_iuv_beside(options.source)
     person = _find_person(photo, iuv_path, options.person, options, "source")
     taken = {part for garment in options.garments for part in garment.parts}
-    kept = tuple(part for part in range(1, PART_COUNT + 1) if part not in taken)
+    kept = tuple(part for part in ALL_PARTS if part not in taken)
     layers = [unfold(photo, person.iuv, kept, texture_size, alpha=person.alpha)]
+    clearances = [clearance_of(photo, person.iuv, kept, alpha=person.alpha)]
     for number, garment in enumerate(options.garments):
         later = {part for other in options.garments[number + 1 :] for part in other.parts}
-        layers.append(_unfold_garment(garment, later, options, texture_size))
+        layer, clearance = _unfold_garment(garment, later, options, texture_size)
+        layers.append(layer)
+        clearances.append(clearance)
     texture, visibility = merge_textures(layers)
+    merged = torch.cat(merge_textures([(c[:, :1], c[:, 1:]) for c in clearances]), dim=1)
     share = float(visibility.mean())
     if share < SMALLEST_VISIBLE_SHARE:
         raise InputError(
             f"source {options.source} shows too little of the body ({share:.1%} of the texture);"
             " use a larger photo, or choose another --person"
         )
-    return Source(photo, person.iuv, iuv_path, texture, visibility, person.alpha)
+    return Source(photo, person.iuv, iuv_path, texture, visibility, person.alpha, merged)
 
 
 def _find_person(
@@ -189,7 +196,7 @@ def _spread(
 
 def _unfold_garment(
     garment: Garment, later: set[int], options: RenderOptions, texture_size: int
-) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
+) -> tuple[tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]], Float[Tensor, "1 2 128 128"]]:
     photo = read_photo(garment.photo, "garment")
     path = garment.iuv or find_iuv_beside(garment.photo)
     person = _find_person(photo, path, "largest", options, "garment")
@@ -201,7 +208,7 @@ def _unfold_garment(
             f"garment {garment.photo} shows none of {', '.join(PART_NAMES[p] for p in parts)};"
             f" it shows {shown}"
         )
-    return texture, visibility
+    return (texture, visibility), clearance_of(photo, person.iuv, parts, alpha=person.alpha)
 
 
 def read_person(

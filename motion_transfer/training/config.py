@@ -61,6 +61,7 @@ class DataSettings:
             within that; a driver's crop holds all of its poses and is larger, too.
         people, views, size_px: how many synthetic people, photos of each, and their side; 0
             people: ever new ones, two photos each, made while training goes on.
+        people_seed: who they are, if they are kept; `run.seed` decides the order of their pairs.
         noise: share of the photos of people whose IUV has the faults of DensePose's.
         people_cache: folder that keeps them; empty: `people` in the run's.
         moments: frames of a clip that are targets, two in a row for each.
@@ -74,6 +75,7 @@ class DataSettings:
     people: int = 64
     views: int = 4
     size_px: int = 256
+    people_seed: int = 0
     noise: float = 0.5
     people_cache: str = ""
     moments: int = 8

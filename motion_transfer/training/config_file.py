@@ -18,8 +18,8 @@ from nhrr_core.config import PRESETS
 
 SECTIONS = {section.name: section for section in fields(TrainConfig)}
 DEFAULT_PRESET = "lite"
-FREE_TO_CHANGE = ("colour_margin",)
-"""Settings of the model that shape no weights: a run may set them, whatever it starts from."""
+FREE_TO_CHANGE = ("colour_margin", "clearance")
+"""Settings of the model that a run may turn on, whatever it starts from."""
 
 
 def read_settings(path: Path) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import torch
+import torch.nn.functional as F
 
 from motion_transfer.training.checkpoints import RunState
 from motion_transfer.training.config import TrainConfig
@@ -22,7 +23,7 @@ def build_state(
     torch.manual_seed(config.run.seed)
     model = NeuralReRenderer(config.model)
     if init is not None:
-        model.load_state_dict(init.state_dict())
+        model.load_state_dict(_widened(init, model))
     discriminator = None
     if config.losses.adversarial:
         discriminator = Discriminator(
@@ -50,3 +51,15 @@ def build_state(
     if discriminator is not None:
         optimisers["discriminator"] = torch.optim.Adam(discriminator.parameters(), **adam)
     return RunState(model, average, discriminator, optimisers)
+
+
+def _widened(init: NeuralReRenderer, model: NeuralReRenderer) -> dict[str, torch.Tensor]:
+    """The weights to start from; channels that their RenderNet does not read begin without effect.
+
+    They are the clearance's, the last ones.
+    """
+    weights = init.state_dict()
+    first = "render_net.layers.1.weight"
+    missing = model.config.render_inputs - init.config.render_inputs
+    weights[first] = F.pad(weights[first], (0, 0, 0, 0, 0, missing))
+    return weights

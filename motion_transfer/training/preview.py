@@ -66,7 +66,9 @@ def draw_grid(
     colour = np.array(parse_colour(background) or BEYOND_THE_PHOTO, np.float32)
     for preview in previews:
         sample = {name: value[None].to(device) for name, value in preview.sample.items()}
-        feature_map = model.encode_texture(sample["source_texture"], sample["source_visibility"])
+        feature_map = model.encode_texture(
+            sample["source_texture"], sample["source_visibility"], sample.get("source_clearance")
+        )
         drawn = _pixels(model.render(feature_map, sample["target_iuv"])[0])
         if drawn.shape[-1] == 4:
             weight = drawn[..., 3:] / 255

@@ -17,19 +17,22 @@ from torch.utils.data import Dataset, Sampler
 from motion_transfer.errors import InputError
 from motion_transfer.media.image import Photo, read_photo
 from motion_transfer.render.options import parse_colour
+from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import Person, occupancy
 from motion_transfer.render.source import unfold
 from motion_transfer.render.window import Window, plan_window
 from motion_transfer.training.pairs import Pair, flat_stem
 from motion_transfer.training.pictures import PersonPicture, Picture
 from nhrr_core import shrink_texture
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.clearance import CLEARANCE_SIZE
+from nhrr_core.config import CLEARANCE_CHANNELS
+from nhrr_core.iuv import ALL_PARTS
 
 Image = UInt8[np.ndarray, "H W 3"]
 Texture = tuple[Float[Tensor, "3 T T"], Float[Tensor, "1 T T"]]
 
-ALL_PARTS = tuple(range(1, PART_COUNT + 1))
 BEYOND_THE_PHOTO = (255, 255, 255)  # as the renderer's default background
+UNKNOWN_CLEARANCE = 0.15  # of the samples
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +44,7 @@ class SampleSettings:
         jitter: see `motion_transfer.training.config.DataSettings`.
         alpha: give the target's coverage; a target without one is refused.
         target_texture: unfold the target as well, for the texture loss.
+        clearance: give the source's, where it can be known.
         textures: folder that keeps unfolded textures; None: unfold each time.
         half_size_samples: how many samples, the first ones, have half of the two sides.
     """
@@ -53,6 +57,7 @@ class SampleSettings:
     alpha: bool
     target_texture: bool
     textures: Path | None
+    clearance: bool = False
     half_size_samples: int = 0
 
 
@@ -105,6 +110,8 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
                 sample["target_background"] = torch.tensor(colour) / 127.5 - 1
         names = ("source_texture", "source_visibility")
         sample |= zip(names, self._texture(pair.source, shrink), strict=True)
+        if settings.clearance:
+            sample["source_clearance"] = self._clearance(pair.source, random)
         if settings.target_texture:
             names = ("target_texture", "target_visibility")
             sample |= zip(names, self._texture(pair.target, shrink, target), strict=True)
@@ -134,6 +141,15 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
     ) -> Texture:
         """Rounded to 8 bits, whether it was kept or not, so that both are the same."""
         return shrink_texture(*_as_texture(*self._unfolded(picture, loaded)), shrink)
+
+    def _clearance(
+        self, picture: Picture, random: np.random.Generator | None
+    ) -> Float[Tensor, "2 t t"]:
+        """The source's; now and then unknown, as it is of most photos without alpha."""
+        if random is not None and random.random() < UNKNOWN_CLEARANCE:
+            return torch.zeros(CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
+        source = picture.load()
+        return clearance_of(_as_photo(source), source.iuv, ALL_PARTS)[0]
 
     def _unfolded(
         self, picture: Picture, loaded: PersonPicture | None
@@ -220,11 +236,14 @@ def _lay_over(picture: PersonPicture, background: str) -> Image:
 
 
 def _unfold(picture: PersonPicture, size: int) -> tuple[Image, UInt8[np.ndarray, "T T"]]:
-    photo = Photo(Path(picture.name), picture.rgb, picture.alpha, turned=False)
-    texture, visibility = unfold(photo, picture.iuv, ALL_PARTS, size)
+    texture, visibility = unfold(_as_photo(picture), picture.iuv, ALL_PARTS, size)
     rgb = ((texture[0] + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
     seen = (visibility[0, 0] > 0).to(torch.uint8) * 255
     return rgb.permute(1, 2, 0).numpy(), seen.numpy()
+
+
+def _as_photo(picture: PersonPicture) -> Photo:
+    return Photo(Path(picture.name), picture.rgb, picture.alpha, turned=False)
 
 
 def _as_texture(rgb: Image, seen: UInt8[np.ndarray, "T T"]) -> Texture:

@@ -109,7 +109,7 @@ def _open_people(
         out=folder,
         count=settings.people,
         views=settings.views,
-        seed=seed,
+        seed=settings.people_seed,
         size=size,
         noise=settings.noise,
     )

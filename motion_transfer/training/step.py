@@ -88,6 +88,7 @@ def update(
                 batch["source_texture"],
                 batch["source_visibility"],
                 None if inpainting else batch["target_iuv"],
+                batch.get("source_clearance"),
             )
         )
         judge = discriminator and arithmetic.without_hooks(discriminator)

@@ -60,10 +60,11 @@ class Generator(nn.Module):
         texture: Float[Tensor, "B 3 T T"],
         visibility: Float[Tensor, "B 1 T T"],
         target_iuv: UInt8[Tensor, "B 3 S S"] | None,
+        clearance: Float[Tensor, "B 2 t t"] | None = None,
     ) -> tuple[Tensor, Tensor | None, Tensor | None]:
         """The fields of `Drawn`; only the feature map where there is no target."""
         # the grid of the sampler has more digits than bf16
-        feature_map = self.model.encode_texture(texture, visibility).float()
+        feature_map = self.model.encode_texture(texture, visibility, clearance).float()
         if target_iuv is None:
             return feature_map, None, None
         feature_image = self.model.feature_image(feature_map, target_iuv)

@@ -135,6 +135,7 @@ class Trainer:
                 jitter=config.data.jitter,
                 alpha=config.model.alpha,
                 target_texture=config.uses_texture_loss,
+                clearance=config.model.clearance,
                 textures=textures,
                 half_size_samples=config.half_size_steps * self._samples_a_step,
             ),

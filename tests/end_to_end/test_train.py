@@ -183,6 +183,12 @@ def test_synthetic_people(studio, mt, body_model) -> None:
     assert result.code == 0, result.err
     assert 'identity = "none"' in (run / "train.toml").read_text()
     assert "alpha " in result.err
+    again = ("--people-cache", run / "people", "--set=run.seed=5")
+    result = mt(
+        *("train", *people, *again, "-o", studio.folder / "again"),
+        *("--steps", 1, *TINY, "--no-perceptual"),
+    )
+    assert result.code == 0, result.err
     stream = studio.folder / "stream"
     endless = (
         "--data",

@@ -25,6 +25,7 @@ def test_defaults_are_the_papers() -> None:
         "visibility_input": True,
         "prefilled": False,
         "colour_shortcut": False,
+        "clearance": False,
         "colour_margin": False,
     }
 
@@ -33,7 +34,12 @@ def test_presets() -> None:
     assert set(PRESETS) == {"paper", "lite"}
     assert ModelConfig.preset("paper") == ModelConfig()
     assert ModelConfig.preset("lite") == ModelConfig(
-        feature_width=32, render_width=32, prefilled=True, colour_shortcut=True, colour_margin=True
+        feature_width=32,
+        render_width=32,
+        prefilled=True,
+        colour_shortcut=True,
+        colour_margin=True,
+        clearance=True,
     )
 
 

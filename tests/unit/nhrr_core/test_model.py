@@ -22,7 +22,9 @@ from nhrr_core import (
     sample_features,
     shrink_texture,
 )
+from nhrr_core.clearance import UNIT_PIXELS, UNIT_TEXELS, pixels_per_texel
 
+FIRST = "render_net.layers.1.weight"
 SMALL = ModelConfig(
     feature_width=2, render_width=4, residual_blocks=1, texture_size=64, image_size=32
 )
@@ -242,6 +244,45 @@ def test_warp_cond_sees_the_target_iuv_too(targets: Tensor) -> None:
     image = model.feature_image(texture, targets)
     assert torch.equal(image[:, :3], sample_features(texture, targets, model.charts))
     assert torch.equal(image[:, 3:], normalise_iuv(targets))
+
+
+@pytest.fixture
+def clearance() -> Tensor:
+    """Of clothes that stand off the whole body alike, measured at some texels."""
+    clearance = torch.zeros(1, 2, 128, 128)
+    clearance[0, :, ::5, ::5] = torch.tensor([0.75, 1])[:, None, None]
+    return clearance
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_render_net_is_told_the_clearance_in_its_own_pixels(
+    photo: Tensor, iuv: Tensor, clearance: Tensor, variant: str
+) -> None:
+    model = small(variant=variant, clearance=True)
+    plain = small(variant=variant)
+    plain.load_state_dict({**model.state_dict(), FIRST: plain.state_dict()[FIRST]})
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    feature_map = model.encode_texture(texture, visibility, clearance)
+    assert torch.equal(feature_map[:, :-2], plain.encode_texture(texture, visibility))
+    assert torch.allclose(feature_map[:, -2], torch.tensor(0.75))
+    assert torch.equal(feature_map[:, -1], torch.ones(1, 64, 64))
+    for scale in (1, 2):
+        target = iuv.repeat_interleave(scale, 2).repeat_interleave(scale, 3)
+        image = model.feature_image(feature_map, target)[:, plain.config.map_channels :]
+        body = target[:, 0] > 0
+        pixels = 0.75 * UNIT_TEXELS * pixels_per_texel(target, model.charts) / UNIT_PIXELS
+        assert torch.allclose(image[:, 0][body], pixels, rtol=1e-5)
+        assert torch.allclose(image[:, 1][body], torch.tensor(1.0))
+        assert not image[:, :2, ~body[0]].any()
+
+
+def test_a_clearance_may_be_unknown(photo: Tensor, iuv: Tensor) -> None:
+    model = small(clearance=True)
+    own = extract_texture(photo, iuv, model.charts, 64)
+    feature_map = model.encode_texture(*own)
+    assert not feature_map[:, -2:].any()
+    assert torch.equal(feature_map, model.encode_texture(*own, torch.zeros(1, 2, 128, 128)))
+    assert torch.equal(feature_map, model.encode(photo, iuv))
 
 
 @pytest.mark.parametrize("side", [256, 512])

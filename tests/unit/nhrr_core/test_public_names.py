@@ -47,6 +47,7 @@ PUBLIC_NAMES = {
     "shrink_texture",
     "texture_coordinates",
     "texture_loss",
+    "unfold_clearance",
 }
 
 

@@ -23,7 +23,7 @@ from motion_transfer.render.source import (
 from nhrr_core import load_uv_layout
 
 SIZE = 64
-TORSO, HEAD = (2,), (23, 24)
+TORSO, HEAD, SHINS = (2,), (23, 24), (13, 14)
 RED, GREEN, YELLOW = (200, 40, 40), (40, 160, 60), (220, 180, 40)
 
 
@@ -235,3 +235,26 @@ def test_a_garments_iuv_can_be_named(studio) -> None:
     assert colour_of(source, TORSO) == list(GREEN)
     with pytest.raises(InputError, match=r"no IUV found for .*shirt"):
         prepare(studio.source(), garments=(garment(shirt, "torso"),))
+
+
+def test_a_garment_brings_its_own_clearance(studio) -> None:
+    """A photo with alpha tells how wide the trousers are cut; the rest stays the source's."""
+
+    def clear(name: str, reach: int) -> Path:
+        path = studio.source(name, scale=3)
+        pixels = np.array(Image.open(path))
+        body = np.array(Image.open(path.with_name(f"{name}_IUV.png")))[..., 0] > 0
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+        alpha = cv2.dilate(body.astype(np.uint8) * 255, disc)
+        return studio.image(f"{name}.png", np.dstack([pixels, alpha]))
+
+    def width(source: Source, parts: tuple[int, ...]) -> float:
+        assert source.clearance is not None
+        clearance, known = source.clearance[0].numpy()
+        texels = np.isin(load_uv_layout().part.numpy()[1::2, 1::2], parts) & (known > 0)
+        return float(np.percentile(clearance[texels], 90))
+
+    person, trousers = clear("person", 3), clear("trousers", 9)
+    plain, dressed = prepare(person), prepare(person, garments=(garment(trousers, "lower-legs"),))
+    assert width(dressed, SHINS) > 2 * width(plain, SHINS)
+    assert width(dressed, HEAD) == width(plain, HEAD)

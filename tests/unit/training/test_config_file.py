@@ -123,8 +123,9 @@ def test_weights_to_start_from_decide_the_shape() -> None:
     assert build_config({"model.render_width": 8}, model=given).model == given
     with pytest.raises(InputError, match=r"model\.render_width is 16, but the weights .* have 8"):
         build_config({"model.render_width": 16}, model=given)
-    changed = build_config({"model.colour_margin": True}, model=given).model
-    assert changed.to_dict() == {**given.to_dict(), "colour_margin": True}
+    for name in ("colour_margin", "clearance"):
+        changed = build_config({f"model.{name}": True}, model=given).model
+        assert changed.to_dict() == {**given.to_dict(), name: True}
 
 
 def test_the_stages_of_a_run() -> None:

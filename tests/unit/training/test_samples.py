@@ -110,6 +110,17 @@ def test_a_texture_is_halved_over_the_texels_seen(paint_pairs) -> None:
         assert torch.allclose(found, expected, atol=1e-6)
 
 
+def test_the_clearance_is_now_and_then_unknown(paint_pairs) -> None:
+    """Learning, so that photos of which it is not known can be drawn; judging, never."""
+    samples = open_samples(paint_pairs(1), clearance=True)
+    assert "source_clearance" not in open_samples(paint_pairs(1))[0]
+    known = [bool(samples[number]["source_clearance"][1].any()) for number in range(60)]
+    assert 0.6 < sum(known) / 60 < 0.98
+    pair = open_pairs(paint_pairs(1))[0]
+    assert all(samples.load(pair)["source_clearance"][1].any() for _ in range(9))
+    assert samples.load(pair)["source_clearance"].shape == (2, 128, 128)
+
+
 def test_the_number_decides(paint_pairs) -> None:
     path = paint_pairs(3)
     first, again = open_samples(path), open_samples(path)

@@ -1,0 +1,140 @@
+"""How far a person in a photo reaches beyond the body that IUV shows."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Float32, Int64, UInt8
+from torch import Tensor
+
+from motion_transfer.media.image import Photo
+from motion_transfer.render.person import disc, occupancy
+from nhrr_core import load_uv_layout, unfold_clearance
+from nhrr_core.clearance import CLEARANCE_SIZE
+from nhrr_core.config import CLEARANCE_CHANNELS
+
+ROOM_SHARE = 0.25  # of the body's longer side: nobody's clothes reach further
+WORKING_SIDE = 256  # px of the body's longer side: more would not show on CLEARANCE_SIZE texels
+SOLID_ALPHA = 128  # of 255
+SMOOTHING_PX = 1.5  # along the outline, whose pixels see the person's end each for itself
+
+WEAR_SHARE = 0.12  # of the body's longer side: what lies farther away shows the backdrop
+PLAIN_SHARE = 0.95  # of what lies beyond has the backdrop's colour, or there is none
+ABOUT = 20  # of 255, in the channel that differs most
+DARKEST_SHADOW = 0.6  # of the backdrop's light
+FEWEST_BACKDROP_PIXELS = 200
+
+
+def clearance_of(
+    photo: Photo,
+    iuv: UInt8[np.ndarray, "H W 3"],
+    parts: tuple[int, ...],
+    *,
+    alpha: UInt8[np.ndarray, "H W"] | None = None,
+) -> Float[Tensor, "1 2 128 128"]:
+    """The clearance of some parts of a person, see `unfold_clearance`; 0 where it is not known.
+
+    Args:
+        alpha: says where the person ends; None: the photo's own alpha, or else a plain backdrop.
+    """
+    alpha = photo.alpha if alpha is None else alpha
+    unknown = torch.zeros(1, CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
+    if not iuv[..., 0].any():
+        return unknown
+    x, y, width, height = cv2.boundingRect(occupancy(iuv))
+    room = round(max(width, height) * ROOM_SHARE)
+    near = np.s_[max(0, y - room) : y + height + room, max(0, x - room) : x + width + room]
+    shrink = min(1, WORKING_SIDE / max(width, height))
+    own = _shrink(iuv[near], shrink, cv2.INTER_NEAREST_EXACT)
+    if alpha is None:
+        rgb = _shrink(photo.rgb[near], shrink, cv2.INTER_AREA)
+        alpha = stand_out(rgb, occupancy(own), max(width, height) * shrink)
+    else:
+        alpha = _shrink(alpha[near], shrink, cv2.INTER_AREA)
+    if alpha is None:
+        return unknown
+    clearance, measured = measure_clearance(own, alpha)
+    return unfold_clearance(
+        torch.from_numpy(clearance)[None, None],
+        torch.from_numpy(measured & np.isin(own[..., 0], parts))[None, None],
+        torch.from_numpy(own.transpose(2, 0, 1).copy())[None],
+        load_uv_layout().charts,
+    )
+
+
+def stand_out(
+    rgb: UInt8[np.ndarray, "H W 3"], body: UInt8[np.ndarray, "H W"], longer_side: float
+) -> UInt8[np.ndarray, "H W"] | None:
+    """Alpha of a person before a plain backdrop: the body, and what differs from the backdrop.
+
+    Plain is one colour that may change evenly across the photo, as a studio's light does,
+    with the person's shadow on it.
+
+    Args:
+        body: 1 where IUV shows it.
+        longer_side: the body's, px.
+    Returns: None if there is no backdrop to be seen, or not a plain one.
+    """
+    beyond = cv2.dilate(body, disc(longer_side * WEAR_SHARE)) == 0
+    if np.count_nonzero(beyond) < FEWEST_BACKDROP_PIXELS:
+        return None
+    row, column = np.indices(body.shape, np.float32) / longer_side
+    plane = np.stack([row, column, np.ones_like(row)], axis=-1)
+    shade = np.linalg.lstsq(plane[beyond], rgb[beyond].astype(np.float32))[0]
+    backdrop = plane @ shade
+    light = (rgb * backdrop).sum(2) / np.maximum((backdrop**2).sum(2), 1)
+    lit = backdrop * light.clip(DARKEST_SHADOW, 1)[..., None]
+    differs = np.abs(rgb - lit).max(2) > ABOUT
+    if differs[beyond].mean() > 1 - PLAIN_SHARE:
+        return None
+    _, region = cv2.connectedComponents((differs | (body > 0)).astype(np.uint8))
+    own = np.unique(region[body > 0])
+    return np.isin(region, own).astype(np.uint8) * 255
+
+
+def measure_clearance(
+    iuv: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"]
+) -> tuple[Float32[np.ndarray, "H W"], Bool[np.ndarray, "H W"]]:
+    """Pixels from the body's outline to where the person ends, and where that was measured.
+
+    A pixel of the outline answers for everything outside that is nearest to it; one that alpha does
+    not cover has a negative clearance, the distance to where the person begins.
+    """
+    body, person = occupancy(iuv), (alpha >= SOLID_ALPHA).astype(np.uint8)
+    inner = cv2.erode(body, np.ones((3, 3), np.uint8), borderValue=1)
+    outline = (body > 0) & (inner == 0)
+    if not outline.any() or not person.any():
+        return np.zeros(body.shape, np.float32), np.zeros(body.shape, bool)
+    away, nearest = _nearest(body)
+    clearance = np.zeros(body.size, np.float32)
+    outside = (body == 0) & (person > 0)
+    np.maximum.at(clearance, nearest[outside], away[outside])
+    short = (body > 0) & (person == 0)
+    clearance = np.where(short, -_nearest(person)[0], clearance.reshape(body.shape))
+    kernel = (0, 0)
+    weight = cv2.GaussianBlur(outline.astype(np.float32), kernel, SMOOTHING_PX)
+    total = cv2.GaussianBlur(np.where(outline, clearance, 0), kernel, SMOOTHING_PX)
+    return np.where(outline, total / np.maximum(weight, 1e-6), 0).astype(np.float32), outline
+
+
+def _shrink(
+    image: UInt8[np.ndarray, "*shape"], factor: float, interpolation: int
+) -> UInt8[np.ndarray, "*shape"]:
+    if factor == 1:
+        return np.ascontiguousarray(image)
+    size = max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor))
+    return cv2.resize(image, size, interpolation=interpolation)
+
+
+def _nearest(
+    mask: UInt8[np.ndarray, "H W"],
+) -> tuple[Float32[np.ndarray, "H W"], Int64[np.ndarray, "H W"]]:
+    """For each pixel the distance to the mask, and the flat index of the mask's nearest pixel."""
+    away, label = cv2.distanceTransformWithLabels(
+        1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    own = np.flatnonzero(mask)
+    index = np.zeros(int(label.max()) + 1, np.int64)
+    index[np.asarray(label, np.int64).ravel()[own]] = own
+    return np.asarray(away, np.float32), index[np.asarray(label, np.int64)]

@@ -1,0 +1,70 @@
+"""How far clothes and hair stand off the body: what a texture, all on the body, cannot hold.
+
+A photo shows it along the body's outline only, as the distance from there to where the person ends.
+Unfolded like colours, in lengths of the body instead of pixels, it tells RenderNet how far beyond
+the outline of a target pose this person reaches.
+"""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, UInt8
+from torch import Tensor
+
+from nhrr_core.texture import extract_texture
+from nhrr_core.uv_layout import chart_index
+
+CLEARANCE_SIZE = 128
+"""Side of the clearance's texture: outlines are lines, and what lies between is filled."""
+
+UNIT_TEXELS = 4.0
+"""What a clearance of 1 is, in texels of CLEARANCE_SIZE: clothes are about that thick."""
+
+UNIT_PIXELS = 8.0
+"""What a clearance of 1 is to RenderNet, in pixels of its image."""
+
+
+def unfold_clearance(
+    clearance: Float[Tensor, "B 1 H W"],
+    measured: Bool[Tensor, "B 1 H W"],
+    iuv: UInt8[Tensor, "B 3 H W"],
+    charts: Float[Tensor, "24 256 256 2"],
+) -> Float[Tensor, "B 2 128 128"]:
+    """A photo's clearance on the body's surface, in UNIT_TEXELS, and 1 where it was measured.
+
+    Args:
+        clearance: pixels from the body's outline to where the person ends; negative where that is
+            inside the body.
+        measured: where it counts: on the outline.
+    """
+    in_units = clearance / (pixels_per_texel(iuv, charts) * UNIT_TEXELS)[:, None, None, None]
+    return torch.cat(extract_texture(in_units, iuv * measured, charts, CLEARANCE_SIZE), dim=1)
+
+
+def pixels_per_texel(
+    iuv: UInt8[Tensor, "B 3 H W"], charts: Float[Tensor, "24 256 256 2"]
+) -> Float[Tensor, " B"]:
+    """How large a body is in its image: sides of a texel of CLEARANCE_SIZE, in pixels.
+
+    The root of the number of its pixels over the number of texels that they fall into; 1 where
+    nobody is.
+    """
+    index, row, column = (iuv[:, 0] > 0).nonzero(as_tuple=True)
+    part, u, v = iuv[index, :, row, column].long().unbind(1)
+    place = charts.view(-1, 2)[chart_index(part, u, v)] * CLEARANCE_SIZE
+    x, y = place.long().clamp(0, CLEARANCE_SIZE - 1).unbind(1)
+    count, texels = iuv.shape[0], CLEARANCE_SIZE**2
+    hit = torch.zeros(count * texels, device=iuv.device)
+    hit[index * texels + y * CLEARANCE_SIZE + x] = 1
+    pixels = torch.bincount(index, minlength=count)
+    seen = hit.view(count, texels).sum(1)
+    return torch.where(pixels > 0, pixels / seen.clamp_min(1), 1.0).sqrt()
+
+
+def spread_clearance(
+    filled: Float[Tensor, "B 1 t t"], known: Float[Tensor, "B 1 t t"], size: int
+) -> Float[Tensor, "B 2 T T"]:
+    """What the feature map carries: the filled clearance, and whether any was measured."""
+    flag = known.amax((2, 3), keepdim=True).expand_as(filled)
+    return F.interpolate(torch.cat([filled, flag], dim=1), (size, size), mode="nearest")
