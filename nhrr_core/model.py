@@ -14,7 +14,7 @@ from nhrr_core.clearance import (
     pixels_per_texel,
     spread_clearance,
 )
-from nhrr_core.config import COLOUR_CHANNELS, ModelConfig
+from nhrr_core.config import CLEARANCE_CHANNELS, COLOUR_CHANNELS, ModelConfig
 from nhrr_core.errors import ShapeError
 from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import normalise_iuv
@@ -107,7 +107,9 @@ class NeuralReRenderer(nn.Module):
         if not self.config.clearance:
             return feature_map
         if clearance is None:
-            clearance = texture.new_zeros(len(texture), 2, CLEARANCE_SIZE, CLEARANCE_SIZE)
+            clearance = texture.new_zeros(
+                len(texture), CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE
+            )
         carried = spread_clearance(
             *self._mirror_and_fill(*clearance.split(1, 1)), texture.shape[-1]
         )
@@ -157,9 +159,8 @@ class NeuralReRenderer(nn.Module):
         """What RenderNet sees: the sampled map, and the target IUV for `warp-cond`."""
         features = sample_features(feature_map, target_iuv, self.charts)
         if self.config.clearance:
-            others, clearance, known = features.tensor_split([-2, -1], dim=1)
             unit = pixels_per_texel(target_iuv, self.charts) * (UNIT_TEXELS / UNIT_PIXELS)
-            features = torch.cat([others, clearance * unit[:, None, None, None], known], dim=1)
+            features[:, -CLEARANCE_CHANNELS] *= unit[:, None, None]
         if self.config.variant == "warp-cond":
             return torch.cat([features, normalise_iuv(target_iuv)], dim=1)
         return features

@@ -399,10 +399,14 @@ def test_models_do_not_share_their_charts() -> None:
     assert small().charts.count_nonzero() > 0
 
 
-def test_gradient_reaches_both_networks_and_the_photo(iuv: Tensor, targets: Tensor) -> None:
-    model = small().train()
+@pytest.mark.parametrize("told", [False, True])
+def test_gradient_reaches_both_networks_and_the_photo(
+    iuv: Tensor, targets: Tensor, clearance: Tensor, told: bool
+) -> None:
+    model = small(clearance=told).train()
     photo = torch.rand(1, 3, 32, 32, requires_grad=True)
-    frames = model.render(model.encode(photo, iuv), targets)
+    texture = extract_texture(photo, iuv, model.charts, 64)
+    frames = model.render(model.encode_texture(*texture, clearance), targets)
     (frames * torch.rand_like(frames)).sum().backward()
     body = iuv[:, 0] > 0
     assert photo.grad is not None
