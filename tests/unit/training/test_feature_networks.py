@@ -233,7 +233,9 @@ def test_efficientnet_features_are_the_last_of_each_size() -> None:
         block.register_forward_hook(lambda _, __, out: last.update({out.shape[-1]: out}))
     features = network(torch.rand(1, 3, 64, 64))[1:]
     assert [f.shape[-1] for f in features] == [32, 16, 8, 4, 2]
-    assert all(f is last[f.shape[-1]] for f in features)
+    for f in features:
+        assert torch.allclose(f, F.normalize(last[f.shape[-1]], dim=1) * f.shape[1] ** 0.5)
+        assert torch.allclose(f.square().mean(1), torch.tensor(1.0))
 
 
 def test_efficientnet_input_is_that_of_its_training() -> None:
