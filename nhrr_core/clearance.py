@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from nhrr_core.texture import extract_texture
-from nhrr_core.uv_layout import chart_index
+from nhrr_core.uv_layout import texture_coordinates
 
 CLEARANCE_SIZE = 128
 """Side of the clearance's texture: outlines are lines, and what lies between is filled."""
@@ -51,8 +51,8 @@ def pixels_per_texel(
     nobody is.
     """
     index, row, column = (iuv[:, 0] > 0).nonzero(as_tuple=True)
-    part, u, v = iuv[index, :, row, column].long().unbind(1)
-    place = charts.view(-1, 2)[chart_index(part, u, v)] * CLEARANCE_SIZE
+    body = iuv[index, :, row, column].T[None, :, None]  # 1 x 3 x 1 x N
+    place = texture_coordinates(body, charts)[0, 0] * CLEARANCE_SIZE
     x, y = place.long().clamp(0, CLEARANCE_SIZE - 1).unbind(1)
     count, texels = iuv.shape[0], CLEARANCE_SIZE**2
     hit = torch.zeros(count * texels, device=iuv.device)

@@ -66,10 +66,7 @@ class ModelConfig:
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
             raise ConfigError(f"variant is {self.variant!r}; supported are {', '.join(VARIANTS)}")
-        for name in (
-            *("alpha", "visibility_input", "prefilled"),
-            *("colour_shortcut", "colour_margin", "clearance"),
-        ):
+        for name in (field.name for field in fields(self) if field.type == "bool"):
             if not isinstance(getattr(self, name), bool):
                 raise ConfigError(f"{name} is {getattr(self, name)!r}; it must be true or false")
         for name, low, high, multiple in (

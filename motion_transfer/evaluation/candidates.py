@@ -12,7 +12,6 @@ from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
 from motion_transfer.evaluation.results_folder import ResultsFolder
-from motion_transfer.media.image import Photo
 from motion_transfer.media.work import digest_of
 from motion_transfer.render.compose import make_background, paste
 from motion_transfer.render.outline import clearance_of
@@ -35,7 +34,7 @@ class OpenedSource:
 
     def __init__(self, picture: PersonPicture) -> None:
         self.picture = picture
-        self._photo = Photo(Path(picture.name), picture.rgb, picture.alpha, turned=False)
+        self._photo = picture.as_photo()
         self._prepared: dict[int, Source] = {}
 
     def prepare(self, texels: int) -> Source:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Float32, Int64, UInt8
+from jaxtyping import Bool, Float, Float32, UInt8
 from torch import Tensor
 
 from motion_transfer.media.image import Photo
+from motion_transfer.media.nearest import nearest_pixels
 from motion_transfer.render.person import disc, occupancy
+from motion_transfer.render.photo_person import COVERS
 from nhrr_core import load_uv_layout, unfold_clearance
 from nhrr_core.clearance import CLEARANCE_SIZE
 from nhrr_core.config import CLEARANCE_CHANNELS
 
 ROOM_SHARE = 0.25  # of the body's longer side: nobody's clothes reach further
 WORKING_SIDE = 256  # px of the body's longer side: more would not show on CLEARANCE_SIZE texels
-SOLID_ALPHA = 128  # of 255
 SMOOTHING_PX = 1.5  # along the outline, whose pixels see the person's end each for itself
 
 WEAR_SHARE = 0.12  # of the body's longer side: what lies farther away shows the backdrop
@@ -88,11 +89,18 @@ def stand_out(
     labels[core > 0] = cv2.GC_FGD
     if not core.any():
         return None
-    cv2.setRNGSeed(0)  # GrabCut starts from k-means
+    _, region = cv2.connectedComponents(np.maximum(grab_cut(rgb, labels), body))
+    return np.isin(region, np.unique(region[body > 0])).astype(np.uint8) * 255
+
+
+def grab_cut(
+    rgb: UInt8[np.ndarray, "H W 3"], labels: UInt8[np.ndarray, "H W"]
+) -> UInt8[np.ndarray, "H W"]:
+    """1 where the person is, by colour, from GrabCut's labels; the same at every call."""
+    cv2.setRNGSeed(0)  # it starts from k-means
     models = np.zeros((1, 65)), np.zeros((1, 65))
     cv2.grabCut(rgb, labels, (0, 0, 1, 1), *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
-    _, region = cv2.connectedComponents((labels & 1) | body)  # the odd labels are the person
-    return np.isin(region, np.unique(region[body > 0])).astype(np.uint8) * 255
+    return labels & 1  # the odd labels, GC_FGD and GC_PR_FGD, are the person
 
 
 def _is_plain(rgb: UInt8[np.ndarray, "H W 3"], beyond: Bool[np.ndarray, "H W"]) -> bool:
@@ -114,17 +122,17 @@ def measure_clearance(
     A pixel of the outline answers for everything outside that is nearest to it; one that alpha does
     not cover has a negative clearance, the distance to where the person begins.
     """
-    body, person = occupancy(iuv), (alpha >= SOLID_ALPHA).astype(np.uint8)
+    body, person = occupancy(iuv), (alpha >= COVERS).astype(np.uint8)
     inner = cv2.erode(body, np.ones((3, 3), np.uint8), borderValue=1)
     outline = (body > 0) & (inner == 0)
     if not outline.any() or not person.any():
         return np.zeros(body.shape, np.float32), np.zeros(body.shape, bool)
-    away, nearest = _nearest(body)
+    away, nearest = nearest_pixels(body > 0)
     clearance = np.zeros(body.size, np.float32)
     outside = (body == 0) & (person > 0)
     np.maximum.at(clearance, nearest[outside], away[outside])
     short = (body > 0) & (person == 0)
-    clearance = np.where(short, -_nearest(person)[0], clearance.reshape(body.shape))
+    clearance = np.where(short, -nearest_pixels(person > 0)[0], clearance.reshape(body.shape))
     kernel = (0, 0)
     weight = cv2.GaussianBlur(outline.astype(np.float32), kernel, SMOOTHING_PX)
     total = cv2.GaussianBlur(np.where(outline, clearance, 0), kernel, SMOOTHING_PX)
@@ -138,16 +146,3 @@ def _shrink(
         return np.ascontiguousarray(image)
     size = max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor))
     return cv2.resize(image, size, interpolation=interpolation)
-
-
-def _nearest(
-    mask: UInt8[np.ndarray, "H W"],
-) -> tuple[Float32[np.ndarray, "H W"], Int64[np.ndarray, "H W"]]:
-    """For each pixel the distance to the mask, and the flat index of the mask's nearest pixel."""
-    away, label = cv2.distanceTransformWithLabels(
-        1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    own = np.flatnonzero(mask)
-    index = np.zeros(int(label.max()) + 1, np.int64)
-    index[np.asarray(label, np.int64).ravel()[own]] = own
-    return np.asarray(away, np.float32), index[np.asarray(label, np.int64)]

@@ -15,9 +15,10 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.image import Photo, read_photo
 from motion_transfer.media.iuv_image import ChannelOrder
 from motion_transfer.media.iuv_stream import read_single_iuv
+from motion_transfer.media.nearest import take_nearest
 from motion_transfer.render.beside import find_iuv_beside
 from motion_transfer.render.options import Garment, RenderOptions
-from motion_transfer.render.outline import clearance_of
+from motion_transfer.render.outline import clearance_of, grab_cut
 from motion_transfer.render.person import choose_person, disc, find_people, isolate, occupancy
 from motion_transfer.render.photo_person import COVERS, SourcePerson, estimate_person
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
@@ -29,7 +30,6 @@ CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up t
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
 SOLID_ALPHA = 192  # of 255; less is mixed with the background
-GRABCUT_ROUNDS = 3
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
 
 
@@ -168,30 +168,13 @@ def _cut_out(
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 3)
     thickness = cv2.dilate(depth, disc(band))
     inner = depth >= np.minimum(band, thickness / 2)  # a limb thinner than the band keeps its core
-    near = cv2.dilate(mask, disc(height * CLEAR_SHARE))
+    near = cv2.dilate(mask, disc(height * CLEAR_SHARE)) > 0
     if near.all():
         return mask
     labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
     labels[inner & (mask > 0)] = cv2.GC_FGD
-    surroundings = np.where(mask[..., None], rgb, _spread(rgb, near))
-    cv2.setRNGSeed(0)  # GrabCut starts from k-means
-    models = np.zeros((1, 65)), np.zeros((1, 65))
-    cv2.grabCut(surroundings, labels, (0, 0, 1, 1), *models, GRABCUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
-    return labels & 1  # the odd labels, GC_FGD and GC_PR_FGD, are the person
-
-
-def _spread(
-    rgb: UInt8[np.ndarray, "H W 3"], unknown: UInt8[np.ndarray, "H W"]
-) -> UInt8[np.ndarray, "H W 3"]:
-    """Each unknown pixel takes the colour of the nearest known one."""
-    _, nearest = cv2.distanceTransformWithLabels(
-        unknown, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    known = np.flatnonzero(unknown.ravel() == 0)
-    nearest = nearest.astype(np.intp)
-    colours = np.zeros((nearest.max() + 1, 3), np.uint8)
-    colours[nearest.ravel()[known]] = rgb.reshape(-1, 3)[known]
-    return colours[nearest]
+    surroundings = np.where(mask[..., None], rgb, take_nearest(rgb, near))
+    return grab_cut(surroundings, labels)
 
 
 def _unfold_garment(

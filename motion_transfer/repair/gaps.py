@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-from motion_transfer.repair.speckles import take_nearest
+from motion_transfer.media.nearest import take_nearest
 
 FillGaps = Literal["hold", "interpolate"]
 

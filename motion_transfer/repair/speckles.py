@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
+from motion_transfer.media.nearest import take_nearest
+
 Frame = UInt8[np.ndarray, "H W 3"]
 
 
@@ -17,22 +19,6 @@ def remove_speckles(iuv: Frame, smallest_px: int) -> Frame:
     """
     speckles = _find_speckles(np.ascontiguousarray(iuv[..., 0]), smallest_px)
     return take_nearest(iuv, speckles) if speckles.any() else iuv
-
-
-def take_nearest(iuv: Frame, wrong: Bool[np.ndarray, "H W"]) -> Frame:
-    """Every wrong pixel replaced by the nearest right one, as a whole; all wrong: unchanged."""
-    if wrong.all():
-        return iuv
-    _, labels = cv2.distanceTransformWithLabels(
-        wrong.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    nearest = np.asarray(labels, np.int32)
-    pixel_of_label = np.zeros(int(nearest.max()) + 1, np.int64)
-    right = np.flatnonzero(~wrong)
-    pixel_of_label[nearest.reshape(-1)[right]] = right
-    mended = iuv.copy()
-    mended[wrong] = iuv.reshape(-1, 3)[pixel_of_label[nearest[wrong]]]
-    return mended
 
 
 def _find_speckles(part: UInt8[np.ndarray, "H W"], smallest_px: int) -> Bool[np.ndarray, "H W"]:

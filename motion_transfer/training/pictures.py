@@ -32,6 +32,10 @@ class PersonPicture:
     iuv: UInt8[np.ndarray, "H W 3"]
     alpha: UInt8[np.ndarray, "H W"] | None
 
+    def as_photo(self) -> Photo:
+        """As a renderer's source has it."""
+        return Photo(Path(self.name), self.rgb, self.alpha, turned=False)
+
     def digest(self) -> str:
         """SHA-256 of the pixels, so that another encoding of the same picture is the same."""
         content = hashlib.sha256()

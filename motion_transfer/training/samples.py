@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.image import Photo, read_photo
+from motion_transfer.media.image import read_photo
 from motion_transfer.render.options import parse_colour
 from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import Person, occupancy
@@ -109,9 +109,10 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             if (colour := parse_colour(settings.background)) is not None:
                 sample["target_background"] = torch.tensor(colour) / 127.5 - 1
         names = ("source_texture", "source_visibility")
-        sample |= zip(names, self._texture(pair.source, shrink), strict=True)
-        if settings.clearance:
-            sample["source_clearance"] = self._clearance(pair.source, random)
+        source = pair.source.load() if settings.clearance else None
+        sample |= zip(names, self._texture(pair.source, shrink, source), strict=True)
+        if source:
+            sample["source_clearance"] = _clearance(source, random)
         if settings.target_texture:
             names = ("target_texture", "target_visibility")
             sample |= zip(names, self._texture(pair.target, shrink, target), strict=True)
@@ -141,15 +142,6 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
     ) -> Texture:
         """Rounded to 8 bits, whether it was kept or not, so that both are the same."""
         return shrink_texture(*_as_texture(*self._unfolded(picture, loaded)), shrink)
-
-    def _clearance(
-        self, picture: Picture, random: np.random.Generator | None
-    ) -> Float[Tensor, "2 t t"]:
-        """The source's; now and then unknown, as it is of most photos without alpha."""
-        if random is not None and random.random() < UNKNOWN_CLEARANCE:
-            return torch.zeros(CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
-        source = picture.load()
-        return clearance_of(_as_photo(source), source.iuv, ALL_PARTS)[0]
 
     def _unfolded(
         self, picture: Picture, loaded: PersonPicture | None
@@ -236,14 +228,17 @@ def _lay_over(picture: PersonPicture, background: str) -> Image:
 
 
 def _unfold(picture: PersonPicture, size: int) -> tuple[Image, UInt8[np.ndarray, "T T"]]:
-    texture, visibility = unfold(_as_photo(picture), picture.iuv, ALL_PARTS, size)
+    texture, visibility = unfold(picture.as_photo(), picture.iuv, ALL_PARTS, size)
     rgb = ((texture[0] + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
     seen = (visibility[0, 0] > 0).to(torch.uint8) * 255
     return rgb.permute(1, 2, 0).numpy(), seen.numpy()
 
 
-def _as_photo(picture: PersonPicture) -> Photo:
-    return Photo(Path(picture.name), picture.rgb, picture.alpha, turned=False)
+def _clearance(source: PersonPicture, random: np.random.Generator | None) -> Float[Tensor, "2 t t"]:
+    """The source's; now and then unknown, as it is of most photos without alpha."""
+    if random is not None and random.random() < UNKNOWN_CLEARANCE:
+        return torch.zeros(CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
+    return clearance_of(source.as_photo(), source.iuv, ALL_PARTS)[0]
 
 
 def _as_texture(rgb: Image, seen: UInt8[np.ndarray, "T T"]) -> Texture:

@@ -15,6 +15,7 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from motion_transfer.media.nearest import nearest_pixels
 from motion_transfer.people.figure.body import Faces, Points
 from motion_transfer.people.figure.rasterise import Triangles, rasterise, triangle_ids
 
@@ -167,11 +168,4 @@ def flat_map(
     out[seen] = np.einsum("nk,nkc->nc", share, values[faces[ids[seen]]])
     mask = (ids >= 0).reshape(height, width).astype(np.uint8)
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5) / texels_per_metre
-    _, labels = cv2.distanceTransformWithLabels(
-        1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    nearest = np.asarray(labels, np.int64).ravel()
-    lookup = np.zeros(int(nearest.max()) + 1, np.int64)
-    lookup[nearest[seen]] = seen
-    filled = out[lookup[nearest]]
-    return filled.reshape(height, width, -1), depth.astype(np.float32)
+    return out[nearest_pixels(mask > 0)[1]], depth.astype(np.float32)
