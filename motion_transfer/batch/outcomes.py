@@ -70,16 +70,13 @@ class Outcomes:
         self.tally = Tally()
         self.feature_maps = 0
 
-    @property
-    def halted(self) -> bool:
-        """Whether nothing new is begun."""
-        return self._halted
-
-    def halt(self) -> None:
-        """Begin nothing new; what runs is finished."""
-        if not self._halted:
-            self._halted = True
-            self._listener(events.BatchStopping(len(self._running)))
+    def halt(self) -> bool:
+        """Begin nothing new; what runs is finished. Returns: False if it was so already."""
+        if self._halted:
+            return False
+        self._halted = True
+        self._listener(events.BatchStopping(len(self._running)))
+        return True
 
     def _receive(self, future: Future[Any]) -> None:
         place, task = self._running.pop(future)

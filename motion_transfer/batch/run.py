@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import os
-import signal
-import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
 
 from motion_transfer.batch.events import BatchFinished, BatchListener, BatchStarted
 from motion_transfer.batch.expand import Job, check_inputs, expand, find_output_root
@@ -18,6 +14,7 @@ from motion_transfer.batch.manifest import Manifest
 from motion_transfer.batch.manifest_file import ManifestError, read_manifest
 from motion_transfer.batch.report import write_report
 from motion_transfer.batch.schedule import Scheduler, Tally
+from motion_transfer.batch.signals import Signals
 from motion_transfer.batch.state import TO_DO, BatchState
 from motion_transfer.batch.workers import LocalWorkers, Workers
 from motion_transfer.errors import InputError
@@ -59,17 +56,6 @@ class BatchOptions:
             raise InputError("--address is of a Ray cluster; add --engine ray")
 
 
-class Haltable(Protocol):
-    """What Ctrl-C is for: a scheduler."""
-
-    @property
-    def halted(self) -> bool: ...
-
-    def halt(self) -> None:
-        """Begin nothing new."""
-        ...
-
-
 @dataclass(frozen=True)
 class Batch:
     """A manifest that was read."""
@@ -108,7 +94,7 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
     with explain_disk_errors(batch.state.folder), batch.state.held():
         if options.restart:
             batch.state.forget()
-        workers = _open_workers(options, batch.state.scratch)
+        workers, signals = _open_workers(options, batch.state.scratch), Signals()
         scheduler = Scheduler(
             jobs,
             workers,
@@ -117,9 +103,10 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
             keep_going=options.keep_going,
             restart=options.restart,
             listener=listener,
+            signals=signals,
         )
         listener(BatchStarted(len(jobs), workers.count))
-        with heed_interrupts(scheduler) as interrupts:
+        with signals.noted():
             tally = scheduler.run()
         listener(
             BatchFinished(
@@ -129,7 +116,7 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
             )
         )
         write_report(batch.jobs, batch.state)
-    if interrupts:
+    if signals.interrupted:
         raise KeyboardInterrupt
     return tally
 
@@ -166,27 +153,3 @@ def _default_count() -> int:
     """One worker a GPU, as the driver lists them; else one a core."""
     gpus = len(list(Path("/proc/driver/nvidia/gpus").glob("*")))
     return gpus or len(os.sched_getaffinity(0))
-
-
-@contextmanager
-def heed_interrupts(scheduler: Haltable) -> Iterator[list[int]]:
-    """The first Ctrl-C lets running chunks finish; one while they do stops now.
-
-    Yields: the signals that were heard.
-    """
-    heard: list[int] = []
-
-    def hear(number: int, _frame: Any) -> None:
-        heard.append(number)
-        if scheduler.halted:
-            raise KeyboardInterrupt
-        scheduler.halt()
-
-    if threading.current_thread() is not threading.main_thread():
-        yield heard
-        return
-    before = signal.signal(signal.SIGINT, hear)
-    try:
-        yield heard
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -15,6 +15,7 @@ from motion_transfer.batch import events, tasks
 from motion_transfer.batch.active import ActiveJob, Shared, look_name, scan_name
 from motion_transfer.batch.expand import Job
 from motion_transfer.batch.outcomes import Outcomes, Tally, Task
+from motion_transfer.batch.signals import Signals
 from motion_transfer.batch.signature import is_current, is_ours
 from motion_transfer.batch.state import BatchState
 from motion_transfer.batch.workers import Workers
@@ -39,20 +40,24 @@ class Scheduler(Outcomes):
         keep_going: bool,
         restart: bool,
         listener: events.BatchListener,
+        signals: Signals,
     ) -> None:
         super().__init__(workers, state, retries=retries, keep_going=keep_going, listener=listener)
         self._restart = restart
+        self._signals = signals
         self._statuses: dict[Path, str] = {}
         self._waiting = self._order(jobs)
 
     def run(self) -> Tally:
         """Work until nothing is left to do, then end the workers.
 
+        The first Ctrl-C lets running chunks finish; one while they do stops now, as SIGTERM does.
         However it ends, every finished chunk is kept.
         """
         interrupted = True
         try:
             while True:
+                self._signals.heed(self.halt)
                 if not self._halted:
                     self._fill()
                 if not self._running:

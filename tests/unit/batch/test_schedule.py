@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 from collections import Counter
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from motion_transfer.batch import events, tasks
 from motion_transfer.batch.report import write_report
 from motion_transfer.batch.run import Batch, read_batch, status
 from motion_transfer.batch.schedule import Scheduler, Tally
+from motion_transfer.batch.signals import Signals
 from motion_transfer.media.work import work_path
 from motion_transfer.render.plan import CHUNK_FRAMES
 
@@ -62,15 +64,17 @@ class Run:
 
     def __init__(self, batch: Batch, *, keep_going: bool, retries: int, before: Hook) -> None:
         self.batch = batch
+        signals = Signals()
         self.told: list[events.BatchEvent] = []
         self.workers = InlineWorkers(before)
-        with batch.state.held():
+        with batch.state.held(), signals.noted():
             self.tally: Tally = Scheduler(
                 *(batch.jobs, self.workers, batch.state),
                 retries=retries,
                 keep_going=keep_going,
                 restart=False,
                 listener=self.told.append,
+                signals=signals,
             ).run()
 
     @property
@@ -260,6 +264,36 @@ def test_what_was_being_written_is_removed_when_all_is_stopped(studio, run, walk
         run(job("a.mp4"), before=stop)
     left = {item.name for item in work.iterdir()}
     assert left == {"000000.nut", "journal.jsonl", "lock", "owner.json"}
+    assert run(job("a.mp4")).found_done == [CHUNK_FRAMES]
+
+
+def test_signals_wait_until_a_task_is_handed_over(studio, run, walk) -> None:
+    """In the midst of that a lock may be held, which an exception would leave so."""
+    studio.array(CHUNK_FRAMES + 2, name="walk.npy")
+    handed_over = []
+
+    def press_twice(name: str, number: int) -> None:
+        if name == "render":
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+            handed_over.append(number)
+
+    with pytest.raises(KeyboardInterrupt):
+        run(job("a.mp4"), before=press_twice)
+    assert handed_over == [0]
+    assert run(job("a.mp4")).found_done == [CHUNK_FRAMES]
+
+
+def test_one_ctrl_c_finishes_what_runs(studio, run, walk) -> None:
+    studio.array(CHUNK_FRAMES + 2, name="walk.npy")
+
+    def press(name: str, number: int) -> None:
+        if name == "render" and number == 0:
+            signal.raise_signal(signal.SIGINT)
+
+    result = run(job("a.mp4"), before=press)
+    assert (result.tally.done, result.tally.left) == (0, 1)
+    assert [event for event in result.told if isinstance(event, events.BatchStopping)]
     assert run(job("a.mp4")).found_done == [CHUNK_FRAMES]
 
 

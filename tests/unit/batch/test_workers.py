@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from processes import die_in_mid_result
 
-from motion_transfer.batch.run import heed_interrupts
 from motion_transfer.batch.workers import LocalWorkers
 
 
@@ -45,30 +44,3 @@ def test_half_a_result_is_not_waited_for(tmp_path: Path) -> None:
         assert workers.submit(0, abs, -1).result(100) == 1
     finally:
         workers.stop(now=True)
-
-
-class Halting:
-    """A scheduler that notes that it was told to stop."""
-
-    halted = False
-
-    def halt(self) -> None:
-        self.halted = True
-
-
-def test_the_first_ctrl_c_halts_and_the_second_stops() -> None:
-    scheduler = Halting()
-    before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), heed_interrupts(scheduler) as heard:
-        signal.raise_signal(signal.SIGINT)
-        assert scheduler.halted
-        assert heard
-        signal.raise_signal(signal.SIGINT)
-    assert signal.getsignal(signal.SIGINT) is before
-
-
-def test_a_ctrl_c_after_a_job_failed_fast_stops() -> None:
-    scheduler = Halting()
-    scheduler.halt()
-    with pytest.raises(KeyboardInterrupt), heed_interrupts(scheduler):
-        signal.raise_signal(signal.SIGINT)
