@@ -14,6 +14,7 @@ VARIANTS: tuple[str, ...] = get_args(Variant)
 COLOUR_CHANNELS = 3
 IUV_CHANNELS = 3
 CLEARANCE_CHANNELS = 2
+POSITION_CHANNELS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +34,10 @@ class ModelConfig:
     `colour_margin` carries those three beyond the body's outline (`spread_colours`), where clothes
     and hair are.
     `clearance` tells RenderNet how far those stand off the body in the source (`unfold_clearance`).
+    `geometry` tells both networks where on the body they are, which convolutions cannot see:
+    FeatureNet the position of each texel; RenderNet, on the body and around it, the position and
+    clearance of the place that is nearest, and the distance to the outline (`signed_distance`). Its
+    last convolution reads its input, too: what is as fine as a finger is lost in the layers before.
 
     Attributes:
         variant: `full`; `no-int` (same networks, trained without the texture loss); `ip` (the map
@@ -45,7 +50,7 @@ class ModelConfig:
         texture_size: side of the UV texture in texels, a multiple of 16.
         image_size: side of the image RenderNet works on in pixels, a multiple of 2**down_blocks.
         alpha: RenderNet has a fourth output, the person's coverage.
-        visibility_input, prefilled, colour_shortcut, colour_margin, clearance: see above.
+        visibility_input, prefilled, colour_shortcut, colour_margin, clearance, geometry: see above.
     """
 
     variant: Variant = "full"
@@ -62,6 +67,7 @@ class ModelConfig:
     colour_shortcut: bool = False
     colour_margin: bool = False
     clearance: bool = False
+    geometry: bool = False
 
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
@@ -120,7 +126,8 @@ class ModelConfig:
     @property
     def feature_inputs(self) -> int:
         """Channels that FeatureNet reads: RGB, and what is known of each texel."""
-        return COLOUR_CHANNELS + int(self.visibility_input) + int(self.prefilled)
+        known = int(self.visibility_input) + int(self.prefilled)
+        return COLOUR_CHANNELS + known + POSITION_CHANNELS * self.geometry
 
     @property
     def feature_outputs(self) -> int:
@@ -130,12 +137,16 @@ class ModelConfig:
     @property
     def map_channels(self) -> int:
         """Channels of the feature map: FeatureNet's, and what is carried past it."""
-        return self.feature_outputs + CLEARANCE_CHANNELS * self.clearance
+        carried = CLEARANCE_CHANNELS * self.clearance + POSITION_CHANNELS * self.geometry
+        return self.feature_outputs + carried
 
     @property
     def render_inputs(self) -> int:
-        """Channels that RenderNet reads: the feature image, and the target IUV for `warp-cond`."""
-        return self.map_channels + (IUV_CHANNELS if self.variant == "warp-cond" else 0)
+        """Channels that RenderNet reads: the feature image, the target IUV for `warp-cond`, and
+        what lies nearest and how far."""
+        iuv = IUV_CHANNELS if self.variant == "warp-cond" else 0
+        around = int(self.clearance) + 1 if self.geometry else 0  # positions are in the map
+        return self.map_channels + iuv + around
 
     @property
     def render_outputs(self) -> int:

@@ -53,10 +53,11 @@ class FastRenderNet(nn.Module):
         up = [layer for layer in net.layers if isinstance(layer, nn.ConvTranspose2d)]
         blocks = [layer.body for layer in net.layers if isinstance(layer, ResidualBlock)]
         inner = [layer for body in blocks for layer in body if isinstance(layer, nn.Conv2d)]
+        self.shortcut = net.shortcut
         self.multiple = 2 ** len(up) * (TILE if winograd else 1)
         self.encoder: Callable[[Tensor], Tensor] = _Encoder(plain[:-1], dtype)
         self.trunk: Callable[[Tensor], Tensor] = _Trunk(inner, dtype, winograd)
-        self.decoder: Callable[[Tensor], Tensor] = _Decoder(up, plain[-1], dtype)
+        self.decoder: Callable[[Tensor, Tensor | None], Tensor] = _Decoder(up, plain[-1], dtype)
         if compiled:
             self._compile(winograd)
 
@@ -77,7 +78,9 @@ class FastRenderNet(nn.Module):
         # One sample's large activations fit the cache, a batch's do not: only the trunk, whose
         # matrix products want rows, sees the whole batch.
         encoded = torch.cat([self.encoder(sample) for sample in features.split(1)])
-        return torch.cat([self.decoder(sample) for sample in self.trunk(encoded).split(1)])
+        inputs = features.split(1) if self.shortcut else [None] * len(features)
+        trunk = self.trunk(encoded).split(1)
+        return torch.cat([self.decoder(x, y) for x, y in zip(trunk, inputs, strict=True)])
 
 
 class _Encoder(nn.Module):
@@ -117,7 +120,10 @@ class _Trunk(nn.Module):
 
 
 class _Decoder(nn.Module):
-    """Up-sampling convolutions and the last one: B x H x W x C to B x K x H x W."""
+    """Up-sampling convolutions and the last one: B x H x W x C to B x K x H x W.
+
+    What the network read goes into the last one, too, where it is given.
+    """
 
     def __init__(
         self, convolutions: list[nn.ConvTranspose2d], last: nn.Conv2d, dtype: torch.dtype
@@ -130,12 +136,14 @@ class _Decoder(nn.Module):
         bias = torch.zeros(len(last.weight)) if last.bias is None else last.bias
         self.bias = nn.Parameter(bias.detach().float().clone().view(-1, 1, 1), requires_grad=False)
 
-    def forward(self, x: Tensor) -> Tensor:
+    def forward(self, x: Tensor, features: Tensor | None) -> Tensor:
         *up, last = self.weights
         y = x.to(last.dtype).permute(0, 3, 1, 2)
         for weight in up:
             y = F.conv_transpose2d(y, weight, stride=2, padding=1, output_padding=1)
             y = _norm_relu(y)
+        if features is not None:
+            y = torch.cat([y, features.to(y.dtype)], dim=1)
         y = F.conv2d(F.pad(y, (3, 3, 3, 3), mode="reflect"), last, stride=2)
         return torch.tanh(F.pixel_shuffle(y.float(), 2) + self.bias)
 

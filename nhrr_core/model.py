@@ -14,12 +14,12 @@ from nhrr_core.clearance import (
     pixels_per_texel,
     spread_clearance,
 )
-from nhrr_core.config import CLEARANCE_CHANNELS, COLOUR_CHANNELS, ModelConfig
+from nhrr_core.config import CLEARANCE_CHANNELS, COLOUR_CHANNELS, POSITION_CHANNELS, ModelConfig
 from nhrr_core.errors import ShapeError
 from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import normalise_iuv
 from nhrr_core.render_net import RenderNet
-from nhrr_core.sampling import sample_features, spread_colours
+from nhrr_core.sampling import sample_features, signed_distance, spread_colours
 from nhrr_core.texture import (
     extract_texture,
     fill_texture,
@@ -31,6 +31,9 @@ from nhrr_core.uv_layout import load_uv_layout
 
 MARGIN_LEVELS = 5
 """Colours reach at least 16 pixels beyond the body, and 48 at most: loose clothes and hair."""
+
+OUTLINE_PIXELS = 24
+"""RenderNet is told distances to the outline up to this; clothes and hair seldom reach further."""
 
 
 class NeuralReRenderer(nn.Module):
@@ -51,6 +54,7 @@ class NeuralReRenderer(nn.Module):
     depth_twin: Tensor
     position: Tensor
     surroundings: Tensor
+    places: Tensor
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
@@ -70,6 +74,7 @@ class NeuralReRenderer(nn.Module):
             width=config.render_width,
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
+            shortcut=config.geometry,
         )
         layout = load_uv_layout()
         tables = {"charts": layout.charts.clone()}
@@ -77,6 +82,9 @@ class NeuralReRenderer(nn.Module):
             for name in ("side_twin", "depth_twin", "position"):
                 tables[name] = getattr(layout, name).clone()
             tables["surroundings"] = measure_surroundings(layout.position)
+        if config.geometry:
+            position = layout.position.permute(2, 0, 1)[None]
+            tables["places"] = position / position.abs().amax((2, 3), keepdim=True)
         for name, table in tables.items():
             self.register_buffer(name, table, persistent=False)
 
@@ -103,17 +111,22 @@ class NeuralReRenderer(nn.Module):
             clearance: `unfold_clearance`'s, with `config.clearance`; None: nothing is known of it.
         Raises: ShapeError if its side is not a multiple of 16.
         """
-        feature_map = self._complete(texture, visibility)
-        if not self.config.clearance:
-            return feature_map
-        if clearance is None:
-            clearance = texture.new_zeros(
-                len(texture), CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE
-            )
-        carried = spread_clearance(
-            *self._mirror_and_fill(*clearance.split(1, 1)), texture.shape[-1]
-        )
-        return torch.cat([feature_map, carried], dim=1)
+        carried = [self._complete(texture, visibility)]
+        if self.config.clearance:
+            if clearance is None:
+                clearance = texture.new_zeros(
+                    len(texture), CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE
+                )
+            filled = self._mirror_and_fill(*clearance.split(1, 1))
+            carried.append(spread_clearance(*filled, texture.shape[-1]))
+        if self.config.geometry:
+            carried.append(self._places_like(texture))
+        return torch.cat(carried, dim=1)
+
+    def _places_like(self, texture: Float[Tensor, "B 3 T T"]) -> Float[Tensor, "B 3 T T"]:
+        """The position of each texel on the body, each axis in [-1, 1]."""
+        places = F.interpolate(self.places, texture.shape[2:], mode="nearest-exact")
+        return places.to(texture.dtype).expand_as(texture)
 
     def _complete(
         self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
@@ -144,6 +157,8 @@ class NeuralReRenderer(nn.Module):
         if self.config.prefilled:
             texture, shown = self._mirror_and_fill(texture, visibility)
             known.append(shown)
+        if self.config.geometry:
+            known.append(self._places_like(texture))
         return [texture, *known]
 
     def _mirror_and_fill(
@@ -156,14 +171,24 @@ class NeuralReRenderer(nn.Module):
     def feature_image(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
     ) -> Float[Tensor, "B C H W"]:
-        """What RenderNet sees: the sampled map, and the target IUV for `warp-cond`."""
+        """What RenderNet sees: the sampled map, the target IUV for `warp-cond`, and with
+        `config.geometry` what lies nearest and how far the outline is, in UNIT_PIXELS."""
         features = sample_features(feature_map, target_iuv, self.charts)
         if self.config.clearance:
             unit = pixels_per_texel(target_iuv, self.charts) * (UNIT_TEXELS / UNIT_PIXELS)
-            features[:, -CLEARANCE_CHANNELS] *= unit[:, None, None]
+            features[:, self.config.feature_outputs] *= unit[:, None, None]
+        seen = [features]
+        if self.config.geometry:
+            seen = list(features.tensor_split([-POSITION_CHANNELS], dim=1))
+            if self.config.clearance:
+                clearance = features[:, self.config.feature_outputs, None]
+                seen[1] = torch.cat([clearance, seen[1]], dim=1)
+            body = target_iuv[:, :1] > 0
+            seen[1] = spread_colours(seen[1], body, MARGIN_LEVELS)
+            seen.append(signed_distance(body, OUTLINE_PIXELS) / UNIT_PIXELS)
         if self.config.variant == "warp-cond":
-            return torch.cat([features, normalise_iuv(target_iuv)], dim=1)
-        return features
+            seen.insert(1, normalise_iuv(target_iuv))
+        return torch.cat(seen, dim=1) if len(seen) > 1 else features
 
     def render(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
@@ -192,7 +217,11 @@ class NeuralReRenderer(nn.Module):
             return drawn
         painted, alpha, share = drawn.tensor_split([COLOUR_CHANNELS, -1], dim=1)
         colours = feature_image[:, :COLOUR_CHANNELS].clamp(-1, 1)
-        body = (feature_image != 0).any(dim=1, keepdim=True)
+        body = (
+            feature_image[:, -1:] < 0
+            if self.config.geometry
+            else (feature_image != 0).any(dim=1, keepdim=True)
+        )
         if self.config.colour_margin:
             colours = spread_colours(colours, body, MARGIN_LEVELS)
             body = torch.ones_like(body)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import torch
 from jaxtyping import Float
 from torch import Tensor, nn
+
+LAST_LAYERS = 3
+"""Padding, 7x7 and tanh."""
 
 
 class ResidualBlock(nn.Module):
@@ -29,12 +33,23 @@ class RenderNet(nn.Module):
     """Pix2PixHD's global generator: 7x7, down blocks, residual blocks, up blocks, 7x7, tanh.
 
     Source: the paper, Sec. 3.4; layer shapes from Pix2PixHD (Wang et al., CVPR 2018).
+
+    Args:
+        shortcut: the last convolution reads the network's input, too.
     """
 
     def __init__(
-        self, *, inputs: int, outputs: int, width: int, down_blocks: int, residual_blocks: int
+        self,
+        *,
+        inputs: int,
+        outputs: int,
+        width: int,
+        down_blocks: int,
+        residual_blocks: int,
+        shortcut: bool = False,
     ) -> None:
         super().__init__()
+        self.shortcut = shortcut
         layers: list[nn.Module] = [nn.ReflectionPad2d(3), nn.Conv2d(inputs, width, 7)]
         layers += [nn.InstanceNorm2d(width), nn.ReLU(inplace=True)]
         for i in range(down_blocks):
@@ -48,9 +63,13 @@ class RenderNet(nn.Module):
                 nn.ConvTranspose2d(narrow * 2, narrow, 3, stride=2, padding=1, output_padding=1)
             ]
             layers += [nn.InstanceNorm2d(narrow), nn.ReLU(inplace=True)]
-        layers += [nn.ReflectionPad2d(3), nn.Conv2d(width, outputs, 7), nn.Tanh()]
+        read = width + inputs if shortcut else width
+        layers += [nn.ReflectionPad2d(3), nn.Conv2d(read, outputs, 7), nn.Tanh()]
         self.layers = nn.Sequential(*layers)
 
     def forward(self, features: Float[Tensor, "B C H W"]) -> Float[Tensor, "B K H W"]:
         """A frame in [-1, 1]; H and W multiples of 2**down_blocks."""
-        return self.layers(features)
+        if not self.shortcut:
+            return self.layers(features)
+        drawn = self.layers[:-LAST_LAYERS](features)
+        return self.layers[-LAST_LAYERS:](torch.cat([drawn, features], dim=1))

@@ -74,3 +74,28 @@ def spread_colours(
         filled = F.interpolate(filled, scale_factor=2, mode="bilinear")
         filled = torch.where(finer[:, -1:] > 0, finer, filled / filled[:, -1:].clamp_min(TINY))
     return filled[:, :-1, :height, :width]
+
+
+def signed_distance(inside: Bool[Tensor, "B 1 H W"], reach: int) -> Float[Tensor, "B 1 H W"]:
+    """Distance to the outline in pixels, negative inside; at most `reach` either way.
+
+    The outline runs half-way between the centres of pixels inside and outside, so that no distance
+    is 0. An image without an outline is at `reach` everywhere.
+
+    Args:
+        reach: at most 127, so that no sum of two squares exceeds 16 bits.
+    Source: the exact distance transform of Felzenszwalb and Huttenlocher (2012), whose minimum over
+    parabolas is taken here over those within reach.
+    """
+    far = torch.tensor((reach + 1) ** 2, dtype=torch.int16, device=inside.device)
+    squared = torch.cat([inside, ~inside], dim=1).logical_not() * far  # half of float32's time
+    for axis in (2, 3):
+        nearest, length = squared.clone(), squared.shape[axis]
+        for step in range(1, min(reach + 1, length)):
+            away = squared + step**2
+            for one, other in ((0, step), (step, 0)):
+                part = nearest.narrow(axis, one, length - step)
+                torch.minimum(part, away.narrow(axis, other, length - step), out=part)
+        squared = nearest
+    outside, within = squared.float().sqrt().split(1, dim=1)
+    return torch.where(inside, 0.5 - within, outside - 0.5).clamp(-reach, reach)

@@ -6,7 +6,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -25,6 +25,9 @@ from motion_transfer.render.prepare import make_canvas
 from motion_transfer.render.recipe import Recipe, choose_recipe
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.source import Source, prepare_source
+
+if TYPE_CHECKING:
+    from motion_transfer.render.neural_renderer import NeuralRenderer
 
 NO_FEATURES = "the texture renderer has no feature map; choose nhrr to see one"
 KEPT = 4
@@ -99,9 +102,9 @@ class Pictures:
         return np.where(seen, colours, np.uint8(128))
 
     def feature_map(self, options: RenderOptions) -> Image:
-        """The completed map, 16 channels as colours. Raises: InputError if there is none."""
-        appearance = self._appearance(options)
-        return project_features(appearance[0], *_span(appearance[0]))
+        """FeatureNet's map, 16 channels as colours. Raises: InputError if there is none."""
+        feature_map, _ = self._features(options)
+        return project_features(feature_map, *_span(feature_map))
 
     def feature_image(
         self, options: RenderOptions, look: DriverLook, plans: FramePlans, index: int
@@ -110,24 +113,26 @@ class Pictures:
 
         Raises: InputError if there is none.
         """
-        from motion_transfer.render.neural_renderer import NeuralRenderer
-
-        appearance = self._appearance(options)
-        renderer = self._renderer(options)
-        if not isinstance(renderer, NeuralRenderer):
-            raise InputError(NO_FEATURES)
+        feature_map, renderer = self._features(options)
         iuv, _ = plans.frame(index, look)
         window = plans.window_at(index)
         crop = window.cut(iuv, renderer.working_size(window.side))
-        features = renderer.feature_image(crop[None])[0, : appearance.shape[1]]
-        picture = project_features(features, *_span(appearance[0]))
+        features = renderer.feature_image(crop[None])[0, : len(feature_map)]
+        picture = project_features(features, *_span(feature_map))
         picture[crop[..., 0] == 0] = 255
         return picture
 
-    def _appearance(self, options: RenderOptions) -> Float[np.ndarray, "1 D T T"]:
+    def _features(
+        self, options: RenderOptions
+    ) -> tuple[Float[np.ndarray, "D T T"], NeuralRenderer]:
+        from motion_transfer.render.neural_renderer import NeuralRenderer
+
         if options.renderer == "texture":
             raise InputError(NO_FEATURES)
-        return self.prepared(options)[0]
+        appearance, renderer = self.prepared(options)
+        if not isinstance(renderer, NeuralRenderer):
+            raise InputError(NO_FEATURES)
+        return appearance[0, : renderer.feature_channels], renderer
 
     def _renderer(self, options: RenderOptions) -> Renderer:
         return self.prepared(options)[1]

@@ -90,7 +90,7 @@ def describe_preset(config: ModelConfig) -> Facts:
     with torch.device("meta"):
         feature_net = FeatureNet(
             inputs=config.feature_inputs,
-            outputs=config.map_channels,
+            outputs=config.feature_outputs,
             width=config.feature_width,
         )
         render_net = RenderNet(
@@ -99,6 +99,7 @@ def describe_preset(config: ModelConfig) -> Facts:
             width=config.render_width,
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
+            shortcut=config.geometry,
         )
         flops = {}
         for side in (256, 512):

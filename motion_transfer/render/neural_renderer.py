@@ -64,7 +64,7 @@ class PreparedNetwork:
                 return fast
         plain = deepcopy(net).to(device=self.device, dtype=self.dtype)
         plain = plain.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
-        run = torch.compile(plain) if compile else plain
+        run = torch.compile(plain, dynamic=False) if compile else plain
         return lambda features: run(
             features.to(self.dtype, memory_format=torch.channels_last)
         ).float()
@@ -72,6 +72,9 @@ class PreparedNetwork:
 
 class NeuralRenderer:
     """A prepared network and one source's feature map.
+
+    Attributes:
+        feature_channels: of the map, FeatureNet's own; what follows is carried past it.
 
     A model with an alpha channel says itself what the person covers. One without, as in the paper,
     paints its own background; what lies beyond the (grown, softened) IUV outline is left out.
@@ -83,6 +86,7 @@ class NeuralRenderer:
     def __init__(self, network: PreparedNetwork, feature_map: Tensor) -> None:
         self._network = network
         self._feature_map = feature_map.to(network.device)
+        self.feature_channels = network.config.feature_outputs
         self.occupies: Occupied = "core" if network.device.type == "cpu" else "device"
 
     def working_size(self, window_side: int) -> int:

@@ -18,7 +18,7 @@ from nhrr_core.config import PRESETS
 
 SECTIONS = {section.name: section for section in fields(TrainConfig)}
 DEFAULT_PRESET = "lite"
-FREE_TO_CHANGE = ("colour_margin", "clearance")
+FREE_TO_CHANGE = ("colour_margin", "clearance", "geometry")
 """Settings of the model that a run may turn on, whatever it starts from."""
 
 

@@ -41,7 +41,7 @@ def build_state(
     if config.speed.compile:
         for network in (model.feature_net, model.render_net, discriminator):
             if network is not None:
-                network.compile()
+                network.compile(dynamic=False)  # there are two image sizes at most
     adam: dict[str, Any] = {
         "lr": config.optimiser.learning_rate,
         "betas": (config.optimiser.beta1, config.optimiser.beta2),
@@ -54,12 +54,13 @@ def build_state(
 
 
 def _widened(init: NeuralReRenderer, model: NeuralReRenderer) -> dict[str, torch.Tensor]:
-    """The weights to start from; channels that their RenderNet does not read begin without effect.
+    """The weights to start from; inputs that only the new networks read begin without effect.
 
-    They are the clearance's, the last ones.
+    They are the last ones of their convolutions.
     """
     weights = init.state_dict()
-    first = "render_net.layers.1.weight"
-    missing = model.config.render_inputs - init.config.render_inputs
-    weights[first] = F.pad(weights[first], (0, 0, 0, 0, 0, missing))
+    for name, own in model.state_dict().items():
+        if own.ndim == 4:
+            missing = own.shape[1] - weights[name].shape[1]
+            weights[name] = F.pad(weights[name], (0, 0, 0, 0, 0, missing))
     return weights

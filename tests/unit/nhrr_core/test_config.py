@@ -26,6 +26,7 @@ def test_defaults_are_the_papers() -> None:
         "prefilled": False,
         "colour_shortcut": False,
         "clearance": False,
+        "geometry": False,
         "colour_margin": False,
     }
 

@@ -10,10 +10,21 @@ from nhrr_core import FastRenderNet, RenderNet
 from nhrr_core.winograd import TILE, cook_toom, transform_weight, winograd_convolution
 
 
-def small_net(*, outputs: int = 3, down_blocks: int = 3, residual_blocks: int = 2) -> RenderNet:
+def small_net(
+    *,
+    outputs: int = 3,
+    down_blocks: int = 3,
+    residual_blocks: int = 2,
+    shortcut: bool = False,
+) -> RenderNet:
     torch.manual_seed(0)
     return RenderNet(
-        inputs=5, outputs=outputs, width=4, down_blocks=down_blocks, residual_blocks=residual_blocks
+        inputs=5,
+        outputs=outputs,
+        width=4,
+        down_blocks=down_blocks,
+        residual_blocks=residual_blocks,
+        shortcut=shortcut,
     ).eval()
 
 
@@ -39,9 +50,12 @@ def test_winograd_convolution_equals_conv2d(height: int, width: int) -> None:
 
 
 @pytest.mark.parametrize("winograd", [True, False])
+@pytest.mark.parametrize("shortcut", [True, False])
 @pytest.mark.parametrize(("outputs", "down_blocks"), [(3, 3), (4, 2)])
-def test_same_function_in_float32(winograd: bool, outputs: int, down_blocks: int) -> None:
-    net = small_net(outputs=outputs, down_blocks=down_blocks)
+def test_same_function_in_float32(
+    winograd: bool, shortcut: bool, outputs: int, down_blocks: int
+) -> None:
+    net = small_net(outputs=outputs, down_blocks=down_blocks, shortcut=shortcut)
     fast = FastRenderNet(net, dtype=torch.float32, winograd=winograd, compiled=False)
     features = torch.randn(2, 5, 64, 96)
     with torch.inference_mode():
@@ -63,7 +77,7 @@ def test_bfloat16_stays_within_the_stated_tolerance(winograd: bool) -> None:
 
 @pytest.mark.usefixtures("unchecked")
 def test_compiled_equals_uncompiled() -> None:
-    net = small_net(down_blocks=1, residual_blocks=1)
+    net = small_net(down_blocks=1, residual_blocks=1, shortcut=True)
     forms = [
         FastRenderNet(net, dtype=torch.float32, winograd=True, compiled=compiled)
         for compiled in (True, False)

@@ -23,6 +23,8 @@ from nhrr_core import (
     shrink_texture,
 )
 from nhrr_core.clearance import UNIT_PIXELS, UNIT_TEXELS, pixels_per_texel
+from nhrr_core.model import MARGIN_LEVELS, OUTLINE_PIXELS
+from nhrr_core.sampling import signed_distance, spread_colours
 
 FIRST = "render_net.layers.1.weight"
 SMALL = ModelConfig(
@@ -283,6 +285,56 @@ def test_a_clearance_may_be_unknown(photo: Tensor, iuv: Tensor) -> None:
     assert not feature_map[:, -2:].any()
     assert torch.equal(feature_map, model.encode_texture(*own, torch.zeros(1, 2, 128, 128)))
     assert torch.equal(feature_map, model.encode(photo, iuv))
+
+
+@pytest.mark.parametrize("clearance", [False, True])
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_geometry_tells_render_net_where_it_draws(
+    photo: Tensor, iuv: Tensor, targets: Tensor, variant: str, clearance: bool
+) -> None:
+    model = small(variant=variant, clearance=clearance, geometry=True)
+    plain = small(variant=variant, clearance=clearance)
+    feature_map = model.encode(photo, iuv)
+    assert feature_map.shape[1] == model.config.map_channels
+    feature_map[:, :-3] = torch.rand(1, plain.config.map_channels, 64, 64)
+    image = model.feature_image(feature_map, targets)
+    assert image.shape == (3, model.config.render_inputs, 32, 32)
+    known = plain.config.render_inputs
+    assert torch.equal(image[:, :known], plain.feature_image(feature_map[:, :-3], targets))
+    body, around = targets[:, :1] > 0, image[:, known:]
+    assert torch.equal(around[:, -1:], signed_distance(body, OUTLINE_PIXELS) / UNIT_PIXELS)
+    places = sample_features(feature_map[:, -3:], targets, model.charts)
+    assert torch.allclose(around[:, -4:-1], spread_colours(places, body, MARGIN_LEVELS))
+    assert around.shape[1] == 4 + clearance
+    if clearance:
+        own = image[:, plain.config.feature_outputs, None]
+        assert torch.equal(around[:, :1], spread_colours(own, body, MARGIN_LEVELS))
+
+
+def test_geometry_tells_feature_net_where_texels_lie(photo: Tensor, iuv: Tensor) -> None:
+    torch.manual_seed(0)
+    model = small(geometry=True, prefilled=True)
+    assert model.feature_net is not None
+    read: list[Tensor] = []
+    model.feature_net.register_forward_pre_hook(lambda _, given: read.append(given[0]))
+    feature_map = model.encode(photo, iuv)
+    position = load_uv_layout().position[2::4, 2::4].permute(2, 0, 1)  # 64 of 256 texels
+    # x to the left, y up, z to the front: each by its own largest
+    largest = load_uv_layout().position.abs().amax((0, 1))[:, None, None]
+    assert torch.allclose(read[0][0, -3:], position / largest)
+    assert torch.equal(feature_map[:, -3:], read[0][:, -3:])
+    assert read[0].shape[1] == model.config.feature_inputs == 8
+
+
+def test_geometry_decides_where_colours_show(targets: Tensor) -> None:
+    model = small(colour_shortcut=True, geometry=True)
+    feature_map = torch.zeros(1, model.config.map_channels, 64, 64)  # grey is a colour, too
+    image = model.feature_image(feature_map, targets)
+    drawn = torch.ones(3, 4, 32, 32)
+    frame = model.blend(drawn, image)
+    body = (targets[:, :1] > 0).expand(-1, 3, -1, -1)
+    assert not frame[body].any()
+    assert (frame[~body] == 1).all()
 
 
 @pytest.mark.parametrize("side", [256, 512])

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 import torch
 from torch import nn
@@ -9,7 +11,7 @@ from nhrr_core import ModelConfig, RenderNet
 from nhrr_core.render_net import ResidualBlock
 
 
-def small(**changes: int) -> RenderNet:
+def small(**changes: Any) -> RenderNet:
     sizes = {"inputs": 5, "outputs": 3, "width": 4, "down_blocks": 2, "residual_blocks": 2}
     return RenderNet(**{**sizes, **changes}).eval()
 
@@ -24,6 +26,7 @@ def preset(name: str) -> RenderNet:
             width=config.render_width,
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
+            shortcut=config.geometry,
         )
 
 
@@ -81,6 +84,26 @@ def test_layers_are_the_global_generator_s() -> None:
         ("ConvTranspose2d", 8, 4, 3, 2),
         ("Conv2d", 4, 3, 7, 1),
     ]
+
+
+def test_the_shortcut_leads_to_the_last_convolution() -> None:
+    plain, network = small(), small(shortcut=True)
+    last = network.layers[-2]
+    assert isinstance(last, nn.Conv2d) and last.in_channels == 4 + 5
+    weights = plain.state_dict()
+    name = list(weights)[-2]
+    weights[name] = nn.functional.pad(weights[name], (0, 0, 0, 0, 0, 5))
+    network.load_state_dict(weights)
+    features = torch.rand(2, 5, 16, 24)
+    with torch.no_grad():
+        assert torch.equal(network(features), plain(features))
+        last.weight.zero_()
+        assert last.bias is not None
+        last.bias.zero_()
+        last.weight[1, 4 + 2, 3, 3] = 2.0  # the second output from the third input
+        frame = network(features)
+    assert torch.allclose(frame[:, 1], (2 * features[:, 2]).tanh())
+    assert not frame[:, [0, 2]].any()
 
 
 def test_residual_block_adds_to_what_it_gets() -> None:

@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import pytest
 import torch
+import torch.nn.functional as F
 from reference.nhrr_core_loops import sample_features_loops
 from torch import Tensor
 
 from nhrr_core import ShapeError, sample_features
-from nhrr_core.sampling import spread_colours
+from nhrr_core.sampling import signed_distance, spread_colours
 
 
 @pytest.fixture
@@ -168,3 +169,27 @@ def test_colours_stay_near_what_they_spread_from() -> None:
     assert row[20] < 0.05
     assert row[43] > 0.95
     assert (row[20:44].diff() >= -1e-5).all()
+
+
+@pytest.mark.parametrize("reach", [1, 5, 24])
+def test_distance_to_the_outline_is_exact(reach: int) -> None:
+    inside = F.interpolate((torch.rand(2, 1, 6, 5) > 0.6).float(), size=(54, 38)) > 0
+    distance = signed_distance(inside, reach)
+    assert distance.dtype == torch.float32
+    for own, mask in zip(distance[:, 0], inside[:, 0], strict=True):
+        to_inside, to_outside = (_distance_by_pairs(mask == side) for side in (True, False))
+        expected = torch.where(mask, 0.5 - to_outside, to_inside - 0.5).clamp(-reach, reach)
+        assert torch.allclose(own, expected)
+
+
+def test_without_an_outline_it_is_out_of_reach() -> None:
+    inside = torch.tensor([True, False])[:, None, None, None].expand(2, 1, 8, 40)
+    distance = signed_distance(inside, 12)
+    assert torch.equal(distance[0], torch.full((1, 8, 40), -12.0))
+    assert torch.equal(distance[1], torch.full((1, 8, 40), 12.0))
+
+
+def _distance_by_pairs(mask: Tensor) -> Tensor:
+    """From every pixel to the nearest of the mask, each against each."""
+    places = torch.ones_like(mask).nonzero().float()
+    return torch.cdist(places, mask.nonzero().float()).amin(1).view(mask.shape)

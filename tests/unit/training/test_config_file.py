@@ -123,7 +123,7 @@ def test_weights_to_start_from_decide_the_shape() -> None:
     assert build_config({"model.render_width": 8}, model=given).model == given
     with pytest.raises(InputError, match=r"model\.render_width is 16, but the weights .* have 8"):
         build_config({"model.render_width": 16}, model=given)
-    for name in ("colour_margin", "clearance"):
+    for name in ("colour_margin", "clearance", "geometry"):
         changed = build_config({f"model.{name}": True}, model=given).model
         assert changed.to_dict() == {**given.to_dict(), name: True}
 
