@@ -29,8 +29,7 @@ class ModelConfig:
     mirror image on the body (`mirror_texture`) or else the colours around them (`fill_texture`),
     and as one more channel which of the two.
     `colour_shortcut` carries colours past both networks: FeatureNet's first three channels are
-    added to its input's, and RenderNet writes one more channel, the share with which the feature
-    image's first three show through its drawing, as in Vid2Vid (Wang et al., NeurIPS 2018, Sec. 3).
+    added to its input's, and RenderNet's drawing to the feature image's first three.
     `colour_margin` carries those three beyond the body's outline (`spread_colours`), where clothes
     and hair are.
     `clearance` tells RenderNet how far those stand off the body in the source (`unfold_clearance`).
@@ -92,7 +91,7 @@ class ModelConfig:
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> ModelConfig:
-        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 22.4).
+        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 23.9).
 
         Raises: ConfigError on an unknown name.
         """
@@ -153,11 +152,6 @@ class ModelConfig:
         """Channels of a frame: RGB, and alpha where the configuration has it."""
         return COLOUR_CHANNELS + int(self.alpha)
 
-    @property
-    def drawn_channels(self) -> int:
-        """Channels that RenderNet writes: a frame's, and the share that the colours show with."""
-        return self.render_outputs + int(self.colour_shortcut)
-
 
 PRESETS = {
     "paper": ModelConfig(),
@@ -168,5 +162,6 @@ PRESETS = {
         colour_shortcut=True,
         colour_margin=True,
         clearance=True,
+        geometry=True,
     ),
 }

@@ -70,7 +70,7 @@ class NeuralReRenderer(nn.Module):
         )
         self.render_net = RenderNet(
             inputs=config.render_inputs,
-            outputs=config.drawn_channels,
+            outputs=config.render_outputs,
             width=config.render_width,
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
@@ -206,26 +206,25 @@ class NeuralReRenderer(nn.Module):
         return self.blend(self.render_net(feature_image), feature_image)
 
     def blend(
-        self, drawn: Float[Tensor, "B D H W"], feature_image: Float[Tensor, "B C H W"]
+        self, drawn: Float[Tensor, "B K H W"], feature_image: Float[Tensor, "B C H W"]
     ) -> Float[Tensor, "B K H W"]:
         """The frame, from what RenderNet drew of a feature image.
 
-        With `config.colour_shortcut` the image's colours show through where it shows the body,
-        with `config.colour_margin` also around it; otherwise it is the drawing.
+        With `config.colour_shortcut` the drawing is added to the image's colours, with
+        `config.colour_margin` also to those carried beyond the body's outline.
         """
         if not self.config.colour_shortcut:
             return drawn
-        painted, alpha, share = drawn.tensor_split([COLOUR_CHANNELS, -1], dim=1)
+        painted, alpha = drawn.tensor_split([COLOUR_CHANNELS], dim=1)
         colours = feature_image[:, :COLOUR_CHANNELS].clamp(-1, 1)
-        body = (
-            feature_image[:, -1:] < 0
-            if self.config.geometry
-            else (feature_image != 0).any(dim=1, keepdim=True)
-        )
         if self.config.colour_margin:
+            body = (
+                feature_image[:, -1:] < 0
+                if self.config.geometry
+                else (feature_image != 0).any(dim=1, keepdim=True)
+            )
             colours = spread_colours(colours, body, MARGIN_LEVELS)
-            body = torch.ones_like(body)
-        return torch.cat([torch.lerp(painted, colours, body * (share + 1) / 2), alpha], dim=1)
+        return torch.cat([(colours + 2 * painted).clamp(-1, 1), alpha], dim=1)
 
     def forward(
         self,

@@ -286,7 +286,8 @@ def _place_between_entries(
     low = uv.floor().clamp(0, CHART_SIZE - 2)
     (right, down), (u, v) = (uv - low).unbind(-1), low.long().unbind(-1)
     table = charts.view(-1, 2)
-    corners = torch.stack([table[chart_index(part, u + x, v + y)] for y in (0, 1) for x in (0, 1)])
+    first = chart_index(part, u, v)
+    corners = torch.stack([table[first + (y * CHART_SIZE + x)] for y in (0, 1) for x in (0, 1)])
     weights = _bilinear(down, right)
     smooth = (corners.amax(0) - corners.amin(0)).amax(-1, keepdim=True) <= MAX_ENTRY_STEP
     u, v = uv.round().long().unbind(-1)

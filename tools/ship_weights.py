@@ -1,8 +1,9 @@
-"""Take training runs' weights into the package: `python tools/ship_weights.py NAME RUN [RUN...]`.
+"""Take a training run's weights into the package: `python tools/ship_weights.py NAME RUN`.
 
-Each run began with the weights of the one before. Writes `motion_transfer/weights/NAME.safetensors`
-in float16, and what the runs were into `docs/weights/`: `NAME-1.toml`... (every setting),
-`NAME.csv` (their losses) and `NAME.png` (the curves).
+Writes `motion_transfer/weights/NAME.safetensors` in float16, and what the run was into
+`docs/weights/`: its settings as `NAME-N.toml`, its losses as rows of `NAME.csv`, all runs' curves
+as `NAME.png`. A run with an `init` went on from the weights that ship, and is one more; a run
+without replaces them and everything that was written of them.
 Needs the `train` extra and matplotlib.
 """
 
@@ -25,30 +26,38 @@ ROOT = Path(__file__).parents[1]
 TERMS = ("perceptual", "texture", "alpha", "adversarial", "discriminator")
 WINDOW = 20  # logged values in a moving average
 
-Curve = list[tuple[int, float]]
+Row = dict[str, float | None]
 
 
-def main(name: str, runs: list[Path]) -> None:
+def main(name: str, run: Path) -> None:
     docs = ROOT / "docs" / "weights"
     docs.mkdir(exist_ok=True)
-    curves: dict[str, Curve] = {}
-    marks, recipe, done = [], "", 0
-    for number, run in enumerate(runs, 1):
-        config = build_config(read_settings(run / "train.toml"))
-        recipe = write_toml(forget_folders(config, f"{name}-{number - 1}" if recipe else ""))
-        (docs / f"{name}-{number}.toml").write_text(recipe)
-        marks += [done, done + config.half_size_steps]
-        for term, curve in read_curves(run).items():
-            curves.setdefault(term, []).extend((done + step, value) for step, value in curve)
-        done += int(inspect_checkpoint(run / "weights.safetensors").notes["step"])
-    write_table(docs / f"{name}.csv", curves)
-    draw_curves(docs / f"{name}.png", curves, marks[1:])
-
-    weights = runs[-1] / "weights.safetensors"
-    notes = {**inspect_checkpoint(weights).notes, "train.toml": recipe, "step": str(done)}
     shipped = ROOT / "motion_transfer" / "weights" / f"{name}.safetensors"
+    table = docs / f"{name}.csv"
+    config = build_config(read_settings(run / "train.toml"))
+    if config.run.init:
+        rows = read_table(table)
+        number, done = int(rows[-1]["run"] or 0) + 1, read_steps(shipped)
+    else:
+        for old in docs.glob(f"{name}-*.toml"):
+            old.unlink()
+        rows, number, done = [], 1, 0
+    recipe = write_toml(forget_folders(config, f"{name}-{number - 1}" if number > 1 else ""))
+    (docs / f"{name}-{number}.toml").write_text(recipe)
+    for step, losses in read_losses(run).items():
+        rows.append({"run": number, "step": done + step, **losses})
+    write_table(table, rows)
+    draw_curves(docs / f"{name}.png", rows, find_marks(docs, name, rows))
+
+    weights = run / "weights.safetensors"
+    done += read_steps(weights)
+    notes = {**inspect_checkpoint(weights).notes, "train.toml": recipe, "step": str(done)}
     save_checkpoint(shipped, load_checkpoint(weights), notes=notes, dtype=torch.float16)
     print(f"{shipped}: {shipped.stat().st_size / 1e6:.1f} MB, {done} steps")
+
+
+def read_steps(weights: Path) -> int:
+    return int(inspect_checkpoint(weights).notes["step"])
 
 
 def forget_folders(config: TrainConfig, init: str) -> TrainConfig:
@@ -61,33 +70,57 @@ def forget_folders(config: TrainConfig, init: str) -> TrainConfig:
     )
 
 
-def read_curves(run: Path) -> dict[str, Curve]:
-    """The losses that a run logged; where it was resumed, the later log counts."""
-    found: dict[str, dict[int, float]] = {}
+def read_losses(run: Path) -> dict[int, Row]:
+    """The losses that a run logged, by step; where it was resumed, the later log counts."""
+    found: dict[int, Row] = {}
     for log in sorted((run / "tensorboard").rglob("events.*"), key=lambda path: path.name):
         events = EventAccumulator(str(log), size_guidance={"scalars": 0}).Reload()
         for tag in events.Tags()["scalars"]:
-            if tag.rpartition("/")[2] in TERMS:
-                values = {event.step: event.value for event in events.Scalars(tag)}
-                found.setdefault(tag.rpartition("/")[2], {}).update(values)
-    return {term: sorted(found[term].items()) for term in TERMS if term in found}
+            term = tag.rpartition("/")[2]
+            if term in TERMS:
+                for event in events.Scalars(tag):
+                    found.setdefault(event.step, {})[term] = event.value
+    return dict(sorted(found.items()))
 
 
-def write_table(path: Path, curves: dict[str, Curve]) -> None:
-    table = {term: dict(curve) for term, curve in curves.items()}
-    steps = sorted(set().union(*table.values()))
+def find_marks(docs: Path, name: str, rows: list[Row]) -> list[int]:
+    """Steps at which another run begins, or images grow."""
+    marks, last = [], {int(row["run"] or 0): int(row["step"] or 0) for row in rows}
+    begin = 0
+    for number, end in last.items():
+        config = build_config(read_settings(docs / f"{name}-{number}.toml"))
+        marks += [begin, begin + config.half_size_steps]
+        begin = end
+    return marks[1:]
+
+
+def read_table(path: Path) -> list[Row]:
+    with path.open(newline="") as file:
+        return [
+            {name: float(value) if value else None for name, value in row.items()}
+            for row in csv.DictReader(file)
+        ]
+
+
+def write_table(path: Path, rows: list[Row]) -> None:
+    terms = [term for term in TERMS if any(term in row for row in rows)]
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["step", *table])
-        for step in steps:
-            values = [table[term].get(step) for term in table]
-            writer.writerow([step, *("" if value is None else f"{value:.4f}" for value in values)])
+        writer.writerow(["run", "step", *terms])
+        for row in rows:
+            values = [row.get(term) for term in terms]
+            words = ["" if value is None else f"{value:.4f}" for value in values]
+            writer.writerow([f"{row['run']:.0f}", f"{row['step']:.0f}", *words])
 
 
-def draw_curves(path: Path, curves: dict[str, Curve], marks: list[int]) -> None:
-    figure, panels = plt.subplots(1, len(curves), figsize=(4 * len(curves), 3), squeeze=False)
-    for panel, (term, curve) in zip(panels[0], curves.items(), strict=True):
-        steps, values = zip(*curve, strict=True)
+def draw_curves(path: Path, rows: list[Row], marks: list[int]) -> None:
+    terms = [term for term in TERMS if any(row.get(term) is not None for row in rows)]
+    figure, panels = plt.subplots(1, len(terms), figsize=(4 * len(terms), 3), squeeze=False)
+    for panel, term in zip(panels[0], terms, strict=True):
+        steps, values = zip(
+            *((row["step"], value) for row in rows if (value := row.get(term)) is not None),
+            strict=True,
+        )
         means = [
             sum(values[max(0, i - WINDOW + 1) : i + 1]) / min(i + 1, WINDOW)
             for i in range(len(values))
@@ -102,4 +135,4 @@ def draw_curves(path: Path, curves: dict[str, Curve], marks: list[int]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], [Path(run) for run in sys.argv[2:]])
+    main(sys.argv[1], Path(sys.argv[2]))

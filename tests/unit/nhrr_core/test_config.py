@@ -41,6 +41,7 @@ def test_presets() -> None:
         colour_shortcut=True,
         colour_margin=True,
         clearance=True,
+        geometry=True,
     )
 
 
@@ -166,9 +167,6 @@ def test_channels_of_a_variant(
     assert config.render_inputs == render_inputs
     assert config.render_outputs == 3
     assert ModelConfig(variant=variant, alpha=True).render_outputs == 4
-    for alpha in (False, True):
-        config = ModelConfig(variant=variant, alpha=alpha, colour_shortcut=True)
-        assert config.drawn_channels == config.render_outputs + 1
 
 
 def test_feature_channels_reach_the_map_of_full_only() -> None:

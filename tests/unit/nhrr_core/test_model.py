@@ -191,23 +191,17 @@ def test_a_finer_texture_is_filled_as_finely(photo: Tensor, iuv: Tensor) -> None
 
 @pytest.mark.parametrize("alpha", [False, True])
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_the_share_of_the_shortcut(targets: Tensor, variant: str, alpha: bool) -> None:
+def test_the_drawing_is_added_to_the_colours(variant: str, alpha: bool) -> None:
     model = small(variant=variant, alpha=alpha, colour_shortcut=True)
     feature_image = torch.rand(3, model.config.render_inputs, 32, 32) * 4 - 2
-    channels = model.config.drawn_channels
-    drawn = torch.rand(3, channels, 32, 32) * 2 - 1
-    drawn[0, -1], drawn[1, -1], drawn[2, -1] = 1, -1, 0
-    feature_image[:, :, :, :5] = 0  # off the body
+    drawn = torch.rand(3, model.config.render_outputs, 32, 32) * 2 - 1
+    drawn[0, :3], drawn[1, :3], drawn[2, :3] = 0, 1, -1
     frame = model.blend(drawn, feature_image)
-    assert torch.equal(frame[..., :5], drawn[:, : frame.shape[1], :, :5])
-    frame, drawn, feature_image = (x[..., 5:] for x in (frame, drawn, feature_image))
-    colours = feature_image[:, :3].clamp(-1, 1)
-    assert frame.shape == (3, 4 if alpha else 3, 32, 27)
-    assert torch.allclose(frame[0, :3], colours[0])
-    assert torch.allclose(frame[1, :3], drawn[1, :3])
-    assert torch.allclose(frame[2, :3], (drawn[2, :3] + colours[2]) / 2)
-    if alpha:
-        assert torch.equal(frame[:, 3], drawn[:, 3])
+    assert frame.shape == drawn.shape
+    assert torch.equal(frame[0, :3], feature_image[0, :3].clamp(-1, 1))
+    assert (frame[1, :3] == 1).all(), "any colour can become white"
+    assert (frame[2, :3] == -1).all(), "or black"
+    assert torch.equal(frame[:, 3:], drawn[:, 3:])
 
 
 def test_the_margin_of_the_shortcut() -> None:
@@ -215,9 +209,7 @@ def test_the_margin_of_the_shortcut() -> None:
     image = torch.rand(2, 16, 64, 64) * 2 - 1
     image[0, :, :, 20:] = 0
     image[0, :3, :, :20] = torch.tensor([0.2, -0.4, 0.6])[:, None, None]
-    drawn = torch.zeros(2, 4, 64, 64)
-    drawn[:, 3] = 1  # all of the share
-    frame = model.blend(drawn, image)
+    frame = model.blend(torch.zeros(2, 3, 64, 64), image)
     assert torch.allclose(frame[0, :, :, :40], image[0, :3, :, :1].expand(-1, 64, 40), atol=1e-5)
     assert torch.equal(frame[1], image[1, :3])
 
@@ -326,15 +318,15 @@ def test_geometry_tells_feature_net_where_texels_lie(photo: Tensor, iuv: Tensor)
     assert read[0].shape[1] == model.config.feature_inputs == 8
 
 
-def test_geometry_decides_where_colours_show(targets: Tensor) -> None:
-    model = small(colour_shortcut=True, geometry=True)
+def test_geometry_decides_what_the_margin_is_carried_from(targets: Tensor) -> None:
+    model = small(colour_shortcut=True, colour_margin=True, geometry=True)
     feature_map = torch.zeros(1, model.config.map_channels, 64, 64)  # grey is a colour, too
     image = model.feature_image(feature_map, targets)
-    drawn = torch.ones(3, 4, 32, 32)
-    frame = model.blend(drawn, image)
-    body = (targets[:, :1] > 0).expand(-1, 3, -1, -1)
-    assert not frame[body].any()
-    assert (frame[~body] == 1).all()
+    body = targets[:, :1] > 0
+    image[:, :3] = torch.where(body, image[:, :3], 1)
+    frame = model.blend(torch.zeros(3, 3, 32, 32), image)
+    assert torch.equal(frame, spread_colours(image[:, :3], body, MARGIN_LEVELS))
+    assert not frame[body.expand(-1, 3, -1, -1)].any()
 
 
 @pytest.mark.parametrize("side", [256, 512])
