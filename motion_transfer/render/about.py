@@ -95,7 +95,7 @@ def describe_preset(config: ModelConfig) -> Facts:
         )
         render_net = RenderNet(
             inputs=config.render_inputs,
-            outputs=config.drawn_channels,
+            outputs=config.render_outputs,
             width=config.render_width,
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
