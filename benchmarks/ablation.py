@@ -1,6 +1,6 @@
 """The paper's ablation at an equal, small budget: `docs/quality.md` has what this prints.
 
-    mt people render --count 1500 --views 4 --noise --out people/
+    mt people render --count 1500 --views 4 --noise 0.5 --out people/
     python benchmarks/ablation.py --people-cache people/ -o ablation/ [--steps 300] [--pairs 200]
 
 Trains the five variants one after the other, each with the same seed, people, steps and losses (but
