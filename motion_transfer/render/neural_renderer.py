@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from copy import deepcopy
 
@@ -15,6 +16,7 @@ from motion_transfer.render.person import disc, occupancy
 from motion_transfer.render.renderer import Occupied
 from motion_transfer.render.source import Source
 from motion_transfer.render.threads import one_torch_thread
+from motion_transfer.render.window import SIDE_STEP, drawn_side
 from nhrr_core import FastRenderNet, NeuralReRenderer, RenderNet
 
 MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leave the IUV
@@ -36,16 +38,28 @@ class PreparedNetwork:
         self.config = model.config
         self._model = model.to(self.device)
         self._draw = self._prepare_net(model.render_net, compile=compile)
-        if compile:
-            side = self.config.image_size
-            blank = torch.zeros(self.batch_size, 3, side, side, dtype=torch.uint8)
-            map_side = self.config.finest_texture
-            shape = (1, self.config.map_channels, map_side, map_side)
-            with one_torch_thread():
-                self.draw(torch.zeros(shape, device=self.device), blank)
+        self._compiles = compile
+        self._compiled: set[int] = set()
+        self._compiling = threading.Lock()
+
+    def compile_for(self, side: int) -> None:
+        """Make ready for crops of that side, px, unless that is done or nothing is compiled."""
+        if not self._compiles or side in self._compiled:
+            return
+        with self._compiling, one_torch_thread():
+            if side not in self._compiled:
+                blank = torch.zeros(self.batch_size, 3, side, side, dtype=torch.uint8)
+                map_side = self.config.finest_texture
+                shape = (1, self.config.map_channels, map_side, map_side)
+                self._draw_frames(torch.zeros(shape, device=self.device), blank)
+                self._compiled.add(side)
 
     def draw(self, feature_map: Tensor, target: Tensor) -> Tensor:
         """RenderNet's frames, B x 3 or 4 x S x S uint8, of B x 3 x S x S target IUV."""
+        self.compile_for(target.shape[-1])
+        return self._draw_frames(feature_map, target)
+
+    def _draw_frames(self, feature_map: Tensor, target: Tensor) -> Tensor:
         with torch.inference_mode():
             features = self._model.feature_image(feature_map, target.to(self.device))
             frame = self._model.blend(self._draw(features), features)
@@ -60,7 +74,7 @@ class PreparedNetwork:
         """Float32 features to a float32 frame, in the form that runs fastest here."""
         if compile and self.device.type == "cpu":
             fast = FastRenderNet(net, dtype=self.dtype)
-            if self.config.image_size % fast.multiple == 0:
+            if self.config.image_size % fast.multiple == SIDE_STEP % fast.multiple == 0:
                 return fast
         plain = deepcopy(net).to(device=self.device, dtype=self.dtype)
         plain = plain.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
@@ -90,7 +104,7 @@ class NeuralRenderer:
         self.occupies: Occupied = "core" if network.device.type == "cpu" else "device"
 
     def working_size(self, window_side: int) -> int:
-        return self._network.config.image_size
+        return drawn_side(window_side, self._network.config)
 
     def feature_image(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> Float[np.ndarray, "B D S S"]:
         """The feature map as the target's pixels see it."""

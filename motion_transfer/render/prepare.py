@@ -214,7 +214,8 @@ def given_window(options: RenderOptions) -> Window | None:
 
 def choose_run_recipe(options: RenderOptions, plan: DriverPlan, listener: Listener) -> Recipe:
     """The renderer of a run. Raises: InputError, WeightsError."""
-    return choose_recipe(options, len(plan.frames), digest_weights(options), listener)
+    sides = [shot.window.side for shot in plan.shots]
+    return choose_recipe(options, len(plan.frames), digest_weights(options), listener, sides)
 
 
 def prepare_run(

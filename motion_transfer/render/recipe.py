@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +20,7 @@ from motion_transfer.render.events import Listener, Notice
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.renderer import Renderer
 from motion_transfer.render.source import Source
+from motion_transfer.render.window import drawn_side
 
 TEXTURE_SIZE = 256
 COMPILE_PAYS_FRAMES = 300  # a driver this long earns back the half minute that compiling takes
@@ -62,7 +64,7 @@ class Recipe:
             return window_side
         from motion_transfer.weights.checkpoint import inspect_checkpoint
 
-        return inspect_checkpoint(self.weights).config.image_size
+        return drawn_side(window_side, inspect_checkpoint(self.weights).config)
 
     def appearance_of(self, source: Source) -> Appearance:
         """What has to be computed once per source. Raises: WeightsError."""
@@ -103,11 +105,16 @@ def _open_network(recipe: Recipe) -> PreparedNetwork:
 
 
 def choose_recipe(
-    options: RenderOptions, frame_count: int, digest: str, listener: Listener
+    options: RenderOptions,
+    frame_count: int,
+    digest: str,
+    listener: Listener,
+    window_sides: Collection[int] = (),
 ) -> Recipe:
     """The renderer that the options name, its network loaded and compiled if it is to be.
 
     Args:
+        window_sides: of the windows in the driver, px, which it is compiled for.
         digest: of the weights file; empty if there is none.
     Raises: WeightsError; InputError if compiling is asked for and there is no compiler.
     """
@@ -116,9 +123,12 @@ def choose_recipe(
     compiles = _decide_compile(options.compile, frame_count)
     recipe = Recipe("nhrr", options.weights_file, digest, compiles)
     if compiles:
-        listener(Notice("compiling the network, half a minute at most; later runs find it done"))
+        words = "compiling the network, half a minute at most for each size of crop"
+        listener(Notice(f"{words}; later runs find it done"))
     began = time.perf_counter()
-    _open_network(recipe)
+    network = _open_network(recipe)
+    for side in {recipe.working_size(side) for side in window_sides}:
+        network.compile_for(side)
     if compiles:
         listener(Notice(f"compiled in {time.perf_counter() - began:.0f} s"))
     return recipe

@@ -14,7 +14,7 @@ from nhrr_core import load_uv_layout, sample_features
 from nhrr_core.iuv import PART_COUNT
 from nhrr_core.uv_layout import CHART_SIZE
 
-EDGE_BLUR_SHARE = 1 / 160  # of the crop's side: the width over which the outline fades
+EDGE_BLUR_SHARE = 1 / 180  # of the crop's side: the width over which the outline fades
 
 
 class TextureRenderer:

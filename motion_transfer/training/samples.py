@@ -20,7 +20,7 @@ from motion_transfer.render.options import parse_colour
 from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import Person, occupancy
 from motion_transfer.render.source import unfold
-from motion_transfer.render.window import Window, plan_window
+from motion_transfer.render.window import Window, is_unscaled, plan_window
 from motion_transfer.training.pairs import Pair, flat_stem
 from motion_transfer.training.pictures import PersonPicture, Picture
 from nhrr_core import shrink_texture
@@ -99,8 +99,11 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         size = settings.image_size // shrink
         target = pair.target.load()
         window = person_window(target)
+        unscaled = is_unscaled(window.side, size)
         if random is not None:
             window = _jitter(window, settings.jitter, random)
+        if unscaled:  # as in rendering
+            window = _around_centre(window, size)
         fill = parse_colour(settings.background) or BEYOND_THE_PHOTO
         rgb = cut_picture(window, _lay_over(target, settings.background), size, fill)
         sample = {"target_image": to_tensor(rgb), "target_iuv": _chw(window.cut(target.iuv, size))}
@@ -215,6 +218,11 @@ def _jitter(window: Window, most: float, random: np.random.Generator) -> Window:
     room = (side - window.side) // 2
     x, y = random.integers(-room, room, size=2, endpoint=True)
     return replace(window, x=window.x - room + int(x), y=window.y - room + int(y), side=side)
+
+
+def _around_centre(window: Window, side: int) -> Window:
+    more = side - window.side
+    return Window(window.x - more // 2, window.y - more // 2, side)
 
 
 def _lay_over(picture: PersonPicture, background: str) -> Image:

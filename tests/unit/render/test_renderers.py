@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from motion_transfer.render.neural_renderer import (
     NeuralRenderer,
@@ -85,3 +86,25 @@ def test_softening_never_grows() -> None:
     mask[:30, :30] = 0
     mask[45, 45] = 0
     assert (soften(mask) <= mask).all()
+
+
+def test_a_network_is_compiled_once_for_each_side(
+    source: Source, checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch, "compile", lambda module, **_: module)
+    model = load_checkpoint(checkpoint)
+    network = PreparedNetwork(model, compile=True)
+    feature_map, drawn = encode_source(model, source), []
+
+    def draw(features: torch.Tensor) -> torch.Tensor:
+        drawn.append(features.shape[-1])
+        return features[:, : model.config.render_outputs]
+
+    monkeypatch.setattr(network, "_draw", draw)
+    for side, calls in ((64, 2), (64, 1), (96, 2), (64, 1)):
+        target = torch.zeros(network.batch_size, 3, side, side, dtype=torch.uint8)
+        network.draw(feature_map, target)
+        assert drawn == [side] * calls, "once ahead, then as asked"
+        drawn.clear()
+    network.compile_for(128)
+    assert drawn == [128]

@@ -7,7 +7,8 @@ import pytest
 
 from motion_transfer.render.compose import paste
 from motion_transfer.render.person import Person, find_people
-from motion_transfer.render.window import Window, plan_window
+from motion_transfer.render.window import SIDE_STEP, Window, drawn_side, plan_window
+from nhrr_core import ModelConfig
 
 INSIDE = Window(10, 20, 30)
 BEYOND = [Window(-10, -5, 40), Window(40, 70, 50), Window(-30, -20, 140)]
@@ -65,7 +66,9 @@ def test_a_crop_of_another_size_is_scaled(size: int) -> None:
 def test_the_window_holds_the_whole_path(studio) -> None:
     path = [find_people(frame).persons[0] for frame in studio.walk(15)]
     window = plan_window([*path, None])
-    assert window.side % 2 == 0
+    assert window.side % SIDE_STEP == 0
+    longest = max(max(p.x1 - p.x0, p.y1 - p.y0) for p in path)
+    assert longest * 1.16 <= window.side
     for person in path:
         assert window.x < person.x0
         assert person.x1 < window.x + window.side
@@ -75,5 +78,26 @@ def test_the_window_holds_the_whole_path(studio) -> None:
 
 def test_a_speck_gets_a_window_that_codecs_take() -> None:
     window = plan_window([Person(50, 50, 52, 53, 6, (1,))])
-    assert window.side == 16
-    assert window.x <= 50 < 53 <= window.x + 16
+    assert window.side == 32
+    assert window.x <= 50 < 53 <= window.x + 32
+
+
+@pytest.mark.parametrize(
+    ("side", "image_size", "down_blocks", "drawn"),
+    [
+        (256, 256, 3, 256),
+        (192, 256, 3, 192),
+        (320, 256, 3, 320),
+        (160, 256, 3, 256),
+        (352, 256, 3, 256),
+        (960, 256, 3, 256),
+        (640, 512, 3, 640),
+        (270, 256, 3, 256),  # given by hand: RenderNet halves sides
+        (288, 256, 6, 256),
+        (320, 256, 6, 320),
+    ],
+)
+def test_a_network_draws_windows_of_about_its_size_unscaled(
+    side: int, image_size: int, down_blocks: int, drawn: int
+) -> None:
+    assert drawn_side(side, ModelConfig(image_size=image_size, down_blocks=down_blocks)) == drawn

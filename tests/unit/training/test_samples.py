@@ -161,6 +161,23 @@ def test_without_jitter_the_window_is_the_renderers(studio, paint_pairs) -> None
     assert person_window(target) == plan_window(list(people.persons))
 
 
+def test_windows_of_about_the_image_size_are_not_scaled(paint_pairs) -> None:
+    """As in rendering."""
+    path = paint_pairs(1)
+    target = open_pairs(path)[0].target.load()
+    window = person_window(target)
+    size = round(window.side / 1.2 / 16) * 16
+    assert size < window.side
+    plain = open_samples(path, image_size=size, jitter=0)[0]
+    x, y = (place + (window.side - size) // 2 for place in (window.x, window.y))
+    expected = Window(x, y, size).cut(target.iuv, size)
+    assert (plain["target_iuv"].permute(1, 2, 0).numpy() == expected).all()
+    jittered = open_samples(path, image_size=size, jitter=0.3)
+    drawn = [jittered[number]["target_iuv"] for number in range(6)]
+    assert len({int((iuv[0] > 0).sum()) for iuv in drawn}) == 1, "moved, not scaled"
+    assert len({iuv.numpy().tobytes() for iuv in drawn}) > 3
+
+
 def test_jitter_keeps_the_whole_person(paint_pairs) -> None:
     samples = open_samples(paint_pairs(1), jitter=0.5)
     parts = {frozenset(samples[number]["target_iuv"][0].unique().tolist()) for number in range(8)}
