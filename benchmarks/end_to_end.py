@@ -64,7 +64,8 @@ def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> N
     renderer, reader = prepared.recipe.renderer(appearance), prepared.driver.open()
     print(f"nhrr, {preset}: prepared and compiled in {time.perf_counter() - began:.0f} s")
     window = prepared.plan.shots[0].window
-    crops = np.stack([window.cut(iuv, 256) for iuv in reader.read(0, renderer.batch_size)])
+    size = renderer.working_size(window.side)
+    crops = np.stack([window.cut(iuv, size) for iuv in reader.read(0, renderer.batch_size)])
     ratios = []
     for _ in range(rounds):
         began = time.perf_counter()
