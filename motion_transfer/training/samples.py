@@ -20,7 +20,7 @@ from motion_transfer.render.options import parse_colour
 from motion_transfer.render.outline import clearance_of
 from motion_transfer.render.person import Person, occupancy
 from motion_transfer.render.source import unfold
-from motion_transfer.render.window import Window, is_unscaled, plan_window
+from motion_transfer.render.window import TRAINED_UNSCALED, Window, plan_window
 from motion_transfer.training.pairs import Pair, flat_stem
 from motion_transfer.training.pictures import PersonPicture, Picture
 from nhrr_core import shrink_texture
@@ -99,7 +99,8 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         size = settings.image_size // shrink
         target = pair.target.load()
         window = person_window(target)
-        unscaled = is_unscaled(window.side, size)
+        least, most = TRAINED_UNSCALED
+        unscaled = least * size <= window.side <= most * size
         if random is not None:
             window = _jitter(window, settings.jitter, random)
         if unscaled:  # as in rendering
