@@ -124,6 +124,9 @@ class OptimiserSettings:
     """Adam, for both players. Source: the paper, Sec. 3.5; batch and average are this project's.
 
     Attributes:
+        decay_from: share of the steps after which the learning rate falls in a straight line, to
+            nothing after the last one; 1: it stays as it is. Source: Pix2PixHD, where it is 0.5;
+            the paper says nothing of it.
         batch_size: pairs at once on each device.
         accumulation: batches whose gradients make one step.
         ema_decay: of the averaged weights, which are what is exported; 0: no average.
@@ -133,6 +136,7 @@ class OptimiserSettings:
     """
 
     learning_rate: float = 2e-4
+    decay_from: float = 1.0
     beta1: float = 0.5
     beta2: float = 0.999
     batch_size: int = 4
@@ -221,6 +225,12 @@ class TrainConfig:
         """Steps before the discriminator joins."""
         return round(self.run.steps * self.losses.adversarial_from)
 
+    def learning_rate(self, step: int) -> float:
+        """Of the update after `step` others."""
+        steps, constant = self.run.steps, self.run.steps * self.optimiser.decay_from
+        left = min(1.0, (steps - step) / (steps - constant)) if constant < steps else 1.0
+        return self.optimiser.learning_rate * left
+
     @property
     def inpainting_steps(self) -> int:
         """Steps of the first stage; 0 for all variants but `ip`."""
@@ -242,7 +252,7 @@ LOWEST = {
     "workers": -1,
 }
 SHARES = ("beta1", "beta2", "ema_decay")
-WHOLE_SHARES = ("noise", "adversarial_from", "half_size", "inpainting")
+WHOLE_SHARES = ("noise", "adversarial_from", "decay_from", "half_size", "inpainting")
 
 
 def _find_problem(key: str, value: Any) -> str | None:

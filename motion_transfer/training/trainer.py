@@ -201,6 +201,9 @@ class Trainer:
         config, keeping = self._config, self._config.keeping
         inpainting = self.step < config.inpainting_steps
         set_stage(self._model, inpainting=inpainting)
+        for optimiser in self._state.optimisers.values():
+            for group in optimiser.param_groups:
+                group["lr"] = config.learning_rate(self.step)
         sums: Terms = {}
         clock.start()
         for _ in range(config.optimiser.accumulation):

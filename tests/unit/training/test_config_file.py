@@ -139,6 +139,16 @@ def test_the_stages_of_a_run() -> None:
     assert build_config({**small, "optimiser.half_size": 0}).half_size_steps == 0
 
 
+def test_the_learning_rate_stays_then_falls_to_nothing() -> None:
+    constant = build_config({"run.steps": 8, "optimiser.learning_rate": 0.1})
+    assert {constant.learning_rate(step) for step in range(8)} == {0.1}
+    falling = {"run.steps": 8, "optimiser.learning_rate": 0.1, "optimiser.decay_from": 0.5}
+    rates = [build_config(falling).learning_rate(step) for step in range(9)]
+    assert rates == pytest.approx([0.1] * 5 + [0.075, 0.05, 0.025, 0])
+    whole = build_config({**falling, "optimiser.decay_from": 0})
+    assert whole.learning_rate(4) == pytest.approx(0.05)
+
+
 def test_the_stages_of_ip() -> None:
     assert TrainConfig().inpainting_steps == 0
     assert build_config({"model.variant": "ip", "run.steps": 10}).inpainting_steps == 5

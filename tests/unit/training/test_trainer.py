@@ -107,8 +107,12 @@ def test_stopped_and_resumed_is_uninterrupted(
 
 @pytest.mark.parametrize("stop_at", [1, 2, 3])
 def test_stopped_and_resumed_across_stages(tmp_path: Path, run: Run, stop_at: int) -> None:
-    """Two steps at half size, one at full size, one with the discriminator, as on people."""
+    """Two steps at half size, one at full size, one with the discriminator, as on people.
+
+    The learning rate falls from the second step on.
+    """
     stages = {"optimiser.half_size": 0.5, "losses.adversarial_from": 0.75, "run.steps": 4}
+    stages["optimiser.decay_from"] = 0.25
     shortcuts = {"model.prefilled": True, "model.colour_shortcut": True}
     whole = Run(tmp_path / "whole", run.settings)
     whole.train(**stages, **shortcuts)
@@ -117,6 +121,13 @@ def test_stopped_and_resumed_across_stages(tmp_path: Path, run: Run, stop_at: in
     assert_same(run.checkpoint(4), whole.checkpoint(4))
     judged = ["adversarial" in event.terms for event in whole.logged]
     assert judged == [False, False, False, True]
+
+
+def test_the_learning_rate_falls_as_the_settings_say(run: Run) -> None:
+    run.settings |= {"optimiser.learning_rate": 0.01, "optimiser.decay_from": 0.5}
+    run.train(**{"keeping.checkpoint_every": 1, "keeping.keep_last": 4})
+    rates = [run.checkpoint(step)["optimisers/generator/param_groups/0/lr"] for step in (1, 3, 4)]
+    assert rates == pytest.approx([0.01, 0.01, 0.005]), "of the update that led there"
 
 
 def test_a_run_can_be_made_longer(tmp_path: Path, run: Run) -> None:
