@@ -173,22 +173,24 @@ class NeuralReRenderer(nn.Module):
     ) -> Float[Tensor, "B C H W"]:
         """What RenderNet sees: the sampled map, the target IUV for `warp-cond`, and with
         `config.geometry` what lies nearest and how far the outline is, in UNIT_PIXELS."""
+        config = self.config
         features = sample_features(feature_map, target_iuv, self.charts)
-        if self.config.clearance:
+        own, places = features, features[:, :0]
+        if config.geometry:
+            own, places = features[:, :-POSITION_CHANNELS], features[:, -POSITION_CHANNELS:]
+        clearance = own[:, config.feature_outputs :][:, :1]
+        if config.clearance:
             unit = pixels_per_texel(target_iuv, self.charts) * (UNIT_TEXELS / UNIT_PIXELS)
-            features[:, self.config.feature_outputs] *= unit[:, None, None]
-        seen = [features]
-        if self.config.geometry:
-            seen = list(features.tensor_split([-POSITION_CHANNELS], dim=1))
-            if self.config.clearance:
-                clearance = features[:, self.config.feature_outputs, None]
-                seen[1] = torch.cat([clearance, seen[1]], dim=1)
+            clearance *= unit[:, None, None, None]
+        image = [own]
+        if config.variant == "warp-cond":
+            image.append(normalise_iuv(target_iuv))
+        if config.geometry:
             body = target_iuv[:, :1] > 0
-            seen[1] = spread_colours(seen[1], body, MARGIN_LEVELS)
-            seen.append(signed_distance(body, OUTLINE_PIXELS) / UNIT_PIXELS)
-        if self.config.variant == "warp-cond":
-            seen.insert(1, normalise_iuv(target_iuv))
-        return torch.cat(seen, dim=1) if len(seen) > 1 else features
+            nearest = torch.cat([clearance, places], dim=1)
+            image.append(spread_colours(nearest, body, MARGIN_LEVELS))
+            image.append(signed_distance(body, OUTLINE_PIXELS) / UNIT_PIXELS)
+        return torch.cat(image, dim=1) if len(image) > 1 else own
 
     def render(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
