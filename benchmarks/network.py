@@ -30,8 +30,9 @@ def main() -> None:
     parser.add_argument("--batch", type=int, default=4)
     arguments = parser.parse_args()
 
-    net = random_model(arguments.preset).render_net
-    features = torch.randn(arguments.batch, 16, arguments.size, arguments.size)
+    model = random_model(arguments.preset)
+    net, channels = model.render_net, model.config.render_inputs
+    features = torch.randn(arguments.batch, channels, arguments.size, arguments.size)
     with torch.inference_mode():
         exact = torch.cat([net(sample) for sample in features.split(1)])
         forms: dict[str, Form] = {}
