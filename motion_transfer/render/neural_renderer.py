@@ -19,6 +19,7 @@ from motion_transfer.render.threads import one_torch_thread
 from motion_transfer.render.window import SIDE_STEP, drawn_side
 from nhrr_core import FastRenderNet, NeuralReRenderer, RenderNet
 
+COMPILED_SIDES = 64  # torch compiles a function for 8 shapes; after that it runs as it is written
 MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leave the IUV
 
 
@@ -46,7 +47,8 @@ class PreparedNetwork:
         """Make ready for crops of that side, px, unless that is done or nothing is compiled."""
         if not self._compiles or side in self._compiled:
             return
-        with self._compiling, one_torch_thread():
+        limit = torch._dynamo.config.patch(recompile_limit=COMPILED_SIDES)
+        with self._compiling, one_torch_thread(), limit:
             if side not in self._compiled:
                 blank = torch.zeros(self.batch_size, 3, side, side, dtype=torch.uint8)
                 map_side = self.config.finest_texture
