@@ -2,8 +2,9 @@
 
     mt people render --count 1500 --views 4 --noise 0.5 --out people/
     python benchmarks/ablation.py --people-cache people/ -o ablation/ [--steps 300] [--pairs 200]
+        [--variants warp warp-cond] [--set model.geometry=false]
 
-Trains the five variants one after the other, each with the same seed, people, steps and losses (but
+Trains the variants one after the other, each with the same seed, people, steps and losses (but
 for those that a variant does not have), at 128 x 128, then scores them on held-out people at that
 size. Started again, it goes on where it was stopped.
 """
@@ -11,6 +12,7 @@ size. Started again, it goes on where it was stopped.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,32 +42,36 @@ def main() -> None:
     parser.add_argument("--people-cache", type=Path, required=True)
     parser.add_argument("--steps", type=int, default=300)
     parser.add_argument("--pairs", type=int, default=200)
+    parser.add_argument("--variants", nargs="+", choices=VARIANTS, default=VARIANTS)
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     arguments = parser.parse_args()
     arguments.output.mkdir(exist_ok=True)
+    changes = [f"{name}={value}" for name, value in SETTINGS.items()] + arguments.set
     weights = []
-    for variant in VARIANTS:
+    for variant in arguments.variants:
         run = arguments.output / variant
-        train(run, variant, arguments.people_cache, arguments.steps)
+        train(run, variant, arguments.people_cache, arguments.steps, changes)
         weights.append(arguments.output / f"{variant}.safetensors")
         halve(run / "weights.safetensors", weights[-1])
     call(
         *("eval", "--protocol", "people", "--limit", arguments.pairs, "--size", f"{SIDE}x{SIDE}"),
-        *("--weights", *weights, "--renderer", "texture"),
+        *(word for path in weights for word in ("--weights", path)),
+        *("--renderer", "texture"),
         *("-o", arguments.output / "scores", "--force"),
     )
 
 
-def train(run: Path, variant: str, people: Path, steps: int) -> None:
+def train(run: Path, variant: str, people: Path, steps: int, changes: Sequence[str]) -> None:
     """Train one variant, or go on with it."""
     if run.exists():
         call("train", "--resume", run, "--steps", steps)
         return
     count = sum(1 for entry in people.iterdir() if entry.is_dir())
-    settings = {**SETTINGS, "keeping.textures": run.with_name("textures")}
+    changes = [*changes, f"keeping.textures={run.with_name('textures')}"]
     call(
         *("train", "--preset", "lite", "--variant", variant, "--steps", steps, "-o", run),
         *("--data", "people", "--people", count, "--people-cache", people),
-        *(f"--set={name}={value}" for name, value in settings.items()),
+        *(f"--set={change}" for change in changes),
     )
 
 
