@@ -142,12 +142,12 @@ def overhead(folder: Path, sizes: Sizes) -> None:
     import numpy as np
     import torch
 
+    from motion_transfer.drawing.renderers.network import one_torch_thread
+    from motion_transfer.events import ignore
     from motion_transfer.media.work import WorkFolder
     from motion_transfer.render.engine import Engine
-    from motion_transfer.render.events import ignore
     from motion_transfer.render.options import RenderOptions
     from motion_transfer.render.run import prepare
-    from motion_transfer.render.threads import one_torch_thread
 
     options = RenderOptions(
         source=SOURCE,
@@ -158,8 +158,9 @@ def overhead(folder: Path, sizes: Sizes) -> None:
         compile=not sizes.quick,
     )
     with WorkFolder(options.output) as work:
-        prepared, appearance = prepare(options, work, ignore)
-    renderer, reader = prepared.recipe.renderer(appearance), prepared.driver.open()
+        composed = prepare(options, work, ignore)
+    prepared = composed.prepared
+    renderer, reader = prepared.recipe.renderer(composed.appearance), prepared.driver.open()
     window = prepared.plan.shots[0].window
     side = renderer.working_size(window.side)
     iuv = reader.read(0, renderer.batch_size)

@@ -26,9 +26,9 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, befo
 import numpy as np
 from workload import SOURCE, driver_folder, weights_of
 
+from motion_transfer.events import ignore
 from motion_transfer.media.work import WorkFolder
 from motion_transfer.render.engine import Engine
-from motion_transfer.render.events import ignore
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.run import prepare, run
 

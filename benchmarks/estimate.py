@@ -18,8 +18,8 @@ import numpy as np
 
 from motion_transfer.estimate.blazepose import BlazePoseEstimator
 from motion_transfer.estimate.interface import PersonEstimate
-from motion_transfer.estimate.iuv_loss import IuvScore, score_iuv
-from motion_transfer.estimate.iuv_weights import load_shipped, load_weights
+from motion_transfer.estimate.iuv.network import load_shipped, load_weights
+from motion_transfer.training.iuv.trainer import IuvScore, score_iuv
 
 MAN = (slice(170, 460), slice(170, 290))
 """Rows and columns of one person of the street."""

@@ -28,9 +28,8 @@ import warp as wp
 from motion_transfer.people import photo as photo_module
 from motion_transfer.people.dataset import PeopleStream
 from motion_transfer.people.figure.body import load_body_model
-from motion_transfer.people.figure.charts import load_charts
-from motion_transfer.people.figure.exact_iuv import render_iuv
-from motion_transfer.people.figure.framing import frame_points
+from motion_transfer.people.figure.camera import frame_points
+from motion_transfer.people.figure.charts import load_charts, render_iuv
 
 STEPS = ("frame_points", "paint_background", "floor_shadow", "develop", "render_iuv")
 

@@ -30,10 +30,10 @@ from urllib.parse import urlsplit
 
 from workload import DEMO, SOURCE
 
-from motion_transfer.preview.driver_look import open_look
-from motion_transfer.preview.frame_plans import plan_frames
-from motion_transfer.preview.pictures import Pictures
-from motion_transfer.render.events import ignore
+from motion_transfer.events import ignore
+from motion_transfer.preview.driver import PreviewedDriver, plan_frames
+from motion_transfer.preview.views import Views
+from motion_transfer.render.driver import open_driver
 from motion_transfer.render.options import RenderOptions
 
 DRIVER = DEMO / "driver.mkv"
@@ -166,15 +166,15 @@ def measure_latency(renderer: str, count: int) -> None:
         source=SOURCE, driver=DRIVER, output=Path("unused.mp4"), renderer=renderer
     )
     with TemporaryDirectory() as folder, server(renderer) as page:
-        look = open_look(options, Path(folder), ignore)
-        look.look_through(Event(), lambda _count: None)
-        plans, pictures = plan_frames(look, options), Pictures()
+        driver = PreviewedDriver(open_driver(options, Path(folder), ignore))
+        driver.see_all(Event(), lambda _count: None)
+        plans, views = plan_frames(driver, options), Views()
         key = page.planned()["key"]
         bare, asked = [], []
-        frames = random.Random(0).sample(range(look.frame_count), count + 2)
+        frames = random.Random(0).sample(range(driver.frame_count), count + 2)
         for index in frames:
-            iuv, _ = plans.frame(index, look)
-            draw = pictures.prepared(options)[1]
+            iuv = plans.read(index, driver)
+            draw = views.prepared(options)[1]
             window = plans.window_at(index)
             crop = window.cut(iuv, draw.working_size(window.side))[None]
             began = time.perf_counter()

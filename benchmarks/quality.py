@@ -18,9 +18,8 @@ from pathlib import Path
 from statistics import mean
 
 from motion_transfer.cli.main import main as mt
-from motion_transfer.media.image import read_photo
-from motion_transfer.media.iuv_stream import open_reader, open_stream
-from motion_transfer.render.beside import find_iuv_beside
+from motion_transfer.media.iuv.opening import find_iuv_of, open_reader, open_stream
+from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.run import run
 from motion_transfer.training.metrics import flicker
@@ -41,7 +40,7 @@ def main() -> None:
 
 def list_photos(folder: Path) -> list[Path]:
     """Those with an IUV beside them."""
-    return [path for path in sorted(folder.glob("*.png")) if find_iuv_beside(path)]
+    return [path for path in sorted(folder.glob("*.png")) if find_iuv_of(path)]
 
 
 def compare_photos(fashion: Path, weights: Path, folder: Path) -> None:

@@ -27,8 +27,16 @@ from torch import Tensor
 
 from motion_transfer.training.feature_networks import load_efficientnet_lite0
 from motion_transfer.training.speed import arrange, choose_precision, keep_memory
-from motion_transfer.training.step import Arithmetic, Average, Players, set_stage, update
-from motion_transfer.training.terms import Batch, Generator, Judges
+from motion_transfer.training.step import (
+    Arithmetic,
+    Average,
+    Batch,
+    Generator,
+    Judges,
+    Players,
+    set_stage,
+    update,
+)
 from nhrr_core import Discriminator, LossWeights, ModelConfig, NeuralReRenderer
 
 

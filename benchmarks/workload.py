@@ -8,9 +8,9 @@ from pathlib import Path
 import cv2
 import torch
 
-from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.weights import SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import save_checkpoint
-from motion_transfer.weights.shipped import SHIPPED, find_weights
 from nhrr_core import ModelConfig, NeuralReRenderer
 
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
-from motion_transfer.render.events import Listener, ignore
-from motion_transfer.render.options import Garment, RenderOptions, parse_frames, parse_rate
+from motion_transfer.events import Listener, ignore
+from motion_transfer.media.iuv.formats import ChannelOrder, DriverKind, Missing
+from motion_transfer.option import parse_frames, parse_rate
+from motion_transfer.render.options import Garment, RenderOptions
 from motion_transfer.render.run import RenderReport, run
 
 AnyPath = str | PathLike[str]
@@ -21,50 +23,108 @@ def render_video(
     output: AnyPath,
     *,
     source_iuv: AnyPath | None = None,
-    weights: AnyPath | None = None,
-    estimator_model: AnyPath | None = None,
-    sheet: AnyPath | None = None,
-    audio: AnyPath | None = None,
-    frames: str | tuple[int | None, int | None] | None = None,
-    frame_rate: str | float | Fraction | None = None,
+    person: str = "largest",
+    source_iuv_order: ChannelOrder | None = None,
     garments: Sequence[Garment] = (),
+    driver_kind: DriverKind | None = None,
+    driver_person: str = "largest",
+    iuv_order: ChannelOrder | None = None,
+    missing: Missing | None = None,
+    window: str = "auto",
+    frames: str | tuple[int | None, int | None] | None = None,
+    estimator: str = "blazepose",
+    estimator_model: AnyPath | None = None,
+    fit_body: bool = False,
+    renderer: str = "nhrr",
+    weights: AnyPath | None = None,
+    background: str = "white",
+    workers: int | None = None,
+    compile: bool | None = None,
+    frame_rate: str | float | Fraction | None = None,
+    codec: str | None = None,
+    crf: int | None = None,
+    audio: AnyPath | None = None,
+    size: Literal["driver", "crop", "even"] = "driver",
+    compare: bool = False,
+    sheet: AnyPath | None = None,
+    force: bool = False,
+    restart: bool = False,
     listener: Listener = ignore,
-    **options: Any,
 ) -> RenderReport:
     """Render the person of a photo in the motion of a driver.
 
     Args:
-        source: photo; its IUV is looked for beside it unless `source_iuv` is given, and estimated
-            where there is none.
-        driver: video, photo or folder of photos of a person; or folder of IUV images, IUV image,
-            lossless IUV video, `.npy`, `.npz`; or a motion such as `people:walk`.
+        source: Photo of the person.
+        driver: A video, a photo or a folder of photos of a person; or a folder of IUV images, an
+            IUV image, a lossless IUV video, `.npy`, `.npz`, a detectron2 dump; or a motion such as
+            `people:walk`.
         output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder of PNG.
-        audio: file whose sound is laid under, or `"none"`; else the driver's own, if it has any.
+        source_iuv: The photo's IUV; else it is looked for beside it, and estimated where there is
+            none.
+        person: `largest`, an index from the left (0 first), or a box `x0,y0,x1,y1` in px.
+        source_iuv_order: Channels of the source's and garments' IUV files; else found out.
+        garments: Parts taken from other photos.
+        driver_kind: `iuv` or `pictures`; else found out.
+        driver_person: Whom to follow, as `person`.
+        iuv_order: Channels of the driver's IUV files; else found out.
+        missing: What frames show in which nobody is found: `hold`, `background` or `fail`.
+        window: `auto`, or the square `X,Y,SIDE` of the driver's frame, px, that is drawn.
         frames: `"10:50"` or `(10, 50)`, half-open.
-        frame_rate: frames per second, exact if given as a string or Fraction.
-        garments: parts taken from other photos.
-        listener: called with events (`motion_transfer.render.events`) as the work goes on, from
-            several threads.
-        **options: the other fields of `RenderOptions`, such as `background="photo"`.
+        estimator: Who finds the IUV of raw pictures, `blazepose` or `densepose`.
+        estimator_model: DensePose's file.
+        fit_body: Give the driver's body the proportions of the source's.
+        renderer: `nhrr` (the network) or `texture` (a draft without it).
+        weights: Checkpoint of the network; else the one that ships.
+        background: `white`, `black`, `#rrggbb` or `photo`.
+        workers: Threads; else one for each core.
+        compile: Whether to compile the network; else where it pays.
+        frame_rate: Frames per second, exact if given as a string or Fraction.
+        codec, crf: Of a video; else by container and codec.
+        audio: File whose sound is laid under, or `"none"`; else the driver's own, if it has any.
+        size: The driver's frame, the square around the person, or the frame made even.
+        compare: Show source, IUV and result side by side.
+        sheet: Where to write a contact sheet (PNG) as well.
+        force: Replace an existing output.
+        restart: Begin anew, whatever an interrupted run of the same output has finished.
+        listener: Called with events (`motion_transfer.events`) as the work goes on, from several
+            threads.
 
-    Returns: where the output is, what it holds and how long it took.
+    Returns: Where the output is, what it holds and how long it took.
     Raises: MotionTransferError (`InputError` for input that cannot be used), saying what is wrong,
         where, and what to do. Nothing half-written is left behind.
     """
     return run(
         RenderOptions(
             source=Path(source),
-            driver=Path(driver),
-            output=Path(output),
             source_iuv=_path(source_iuv),
-            weights=_path(weights),
-            estimator_model=_path(estimator_model),
-            sheet=_path(sheet),
-            audio=_path(audio),
-            frames=parse_frames(frames) if isinstance(frames, str) else frames or (None, None),
-            frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
+            person=person,
+            source_iuv_order=source_iuv_order,
             garments=tuple(garments),
-            **options,
+            driver=Path(driver),
+            driver_kind=driver_kind,
+            driver_person=driver_person,
+            iuv_order=iuv_order,
+            missing=missing,
+            window=window,
+            frames=parse_frames(frames) if isinstance(frames, str) else frames or (None, None),
+            estimator=estimator,
+            estimator_model=_path(estimator_model),
+            fit_body=fit_body,
+            renderer=renderer,
+            weights=_path(weights),
+            background=background,
+            workers=workers,
+            compile=compile,
+            output=Path(output),
+            frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
+            codec=codec,
+            crf=crf,
+            audio=_path(audio),
+            size=size,
+            compare=compare,
+            sheet=_path(sheet),
+            force=force,
+            restart=restart,
         ),
         listener,
     )

@@ -6,7 +6,8 @@
     │   ├── WeightsError                2   a file that is not a whole checkpoint
     │   └── OutputError                 2   a place or format that cannot be written
     ├── RenderError                     1   work that failed though its input was accepted
-    └── TrainingError                   1   a run whose losses are no numbers any more
+    ├── TrainingError                   1   a run whose losses are no numbers any more
+    └── FetchError                      1   something to be downloaded that cannot be had
 
 Messages say what was wrong, where, and what to do next.
 """
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 
 class MotionTransferError(Exception):
-    """Base of everything this package raises on purpose."""
+    """The base of everything that this package raises on purpose."""
 
     exit_code = 1
 

@@ -1,3 +1,24 @@
-"""The version, and nothing else, so that reading it costs nothing."""
+"""Versions: the program's own, and those of the packages that it finds installed."""
+
+from __future__ import annotations
 
 __version__ = "0.1.0"
+
+MODULES = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL"}
+"""What a package is imported as, where it is installed under several names or another than that."""
+
+
+def package_version(name: str) -> str:
+    """Tell the version of an installed package, or `unknown`.
+
+    Several distributions hold the same module: OpenCV comes as `opencv-python`, as conda's
+    `opencv`, and so on; the one that is there counts.
+    """
+    from importlib.metadata import PackageNotFoundError, packages_distributions, version
+
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        for other in packages_distributions().get(MODULES.get(name, name), []):
+            return version(other)
+    return "unknown"

@@ -9,14 +9,7 @@ from nhrr_core.discriminator import Discriminator
 from nhrr_core.errors import ConfigError, IuvError, NhrrError, ShapeError
 from nhrr_core.fast_render_net import FastRenderNet
 from nhrr_core.feature_net import FeatureNet
-from nhrr_core.iuv import (
-    PART_COUNT,
-    PART_GROUPS,
-    PART_NAMES,
-    check_iuv,
-    keep_parts,
-    normalise_iuv,
-)
+from nhrr_core.iuv import PART_COUNT, PART_GROUPS, PART_NAMES, check_iuv, keep_parts, normalise_iuv
 from nhrr_core.losses import (
     LossWeights,
     adversarial_loss,

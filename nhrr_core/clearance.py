@@ -2,7 +2,7 @@
 
 A photo shows it along the body's outline only, as the distance from there to where the person ends.
 Unfolded like colours, in lengths of the body instead of pixels, it tells RenderNet how far beyond
-the outline of a target pose this person reaches.
+the outline of a target pose this person reaches. The paper has no such thing.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from nhrr_core.texture import extract_texture
 from nhrr_core.uv_layout import texture_coordinates
 
 CLEARANCE_SIZE = 128
-"""Side of the clearance's texture: outlines are lines, and what lies between is filled."""
+"""Side of the clearance's texture, texels. Few will do: it is known along outlines only."""
 
 UNIT_TEXELS = 4.0
-"""What a clearance of 1 is, in texels of CLEARANCE_SIZE: clothes are about that thick."""
+"""A clearance of 1, in texels of CLEARANCE_SIZE: about the thickness of clothes."""
 
 UNIT_PIXELS = 8.0
-"""What a clearance of 1 is to RenderNet, in pixels of its image."""
+"""A clearance of 1 as RenderNet is told it, in pixels of its image."""
 
 
 def unfold_clearance(
@@ -31,12 +31,13 @@ def unfold_clearance(
     iuv: UInt8[Tensor, "B 3 H W"],
     charts: Float[Tensor, "24 256 256 2"],
 ) -> Float[Tensor, "B 2 128 128"]:
-    """A photo's clearance on the body's surface, in UNIT_TEXELS, and 1 where it was measured.
+    """Unfold a photo's clearance onto the body's surface.
 
     Args:
-        clearance: pixels from the body's outline to where the person ends; negative where that is
+        clearance: Pixels from the body's outline to where the person ends; negative where that is
             inside the body.
-        measured: where it counts: on the outline.
+        measured: Where it counts: on the outline.
+    Returns: The clearance in UNIT_TEXELS, and 1 where it was measured; both 0 elsewhere.
     """
     in_units = clearance / (pixels_per_texel(iuv, charts) * UNIT_TEXELS)[:, None, None, None]
     return torch.cat(extract_texture(in_units, iuv * measured, charts, CLEARANCE_SIZE), dim=1)
@@ -45,15 +46,15 @@ def unfold_clearance(
 def pixels_per_texel(
     iuv: UInt8[Tensor, "B 3 H W"], charts: Float[Tensor, "24 256 256 2"]
 ) -> Float[Tensor, " B"]:
-    """How large a body is in its image: sides of a texel of CLEARANCE_SIZE, in pixels.
+    """Measure how large each body is in its image: the side of a texel of CLEARANCE_SIZE, px.
 
-    The root of the number of its pixels over the number of texels that they fall into; 1 where
-    nobody is.
+    It is the root of the number of the body's pixels over the number of texels that they fall into;
+    1 where nobody is.
     """
     index, row, column = (iuv[:, 0] > 0).nonzero(as_tuple=True)
     body = iuv[index, :, row, column].T[None, :, None]  # 1 x 3 x 1 x N
-    place = texture_coordinates(body, charts)[0, 0] * CLEARANCE_SIZE
-    x, y = place.long().clamp(0, CLEARANCE_SIZE - 1).unbind(1)
+    place = texture_coordinates(body, charts)[0, 0]
+    x, y = (place * CLEARANCE_SIZE).long().clamp(0, CLEARANCE_SIZE - 1).unbind(1)
     count, texels = iuv.shape[0], CLEARANCE_SIZE**2
     hit = torch.zeros(count * texels, device=iuv.device)
     hit[index * texels + y * CLEARANCE_SIZE + x] = 1
@@ -65,6 +66,12 @@ def pixels_per_texel(
 def spread_clearance(
     filled: Float[Tensor, "B 1 t t"], known: Float[Tensor, "B 1 t t"], size: int
 ) -> Float[Tensor, "B 2 T T"]:
-    """What the feature map carries: the filled clearance, and whether any was measured."""
+    """Bring clearance to the size of a feature map, T x T, which carries it to RenderNet.
+
+    Args:
+        filled: Without holes.
+        known: 1 where it was measured.
+    Returns: The clearance; and 1 everywhere if any of it was measured, else 0.
+    """
     flag = known.amax((2, 3), keepdim=True).expand_as(filled)
     return F.interpolate(torch.cat([filled, flag], dim=1), (size, size), mode="nearest")

@@ -11,45 +11,46 @@ from nhrr_core.errors import ConfigError
 Variant = Literal["full", "no-int", "ip", "warp", "warp-cond"]
 VARIANTS: tuple[str, ...] = get_args(Variant)
 
-COLOUR_CHANNELS = 3
-IUV_CHANNELS = 3
-CLEARANCE_CHANNELS = 2
-POSITION_CHANNELS = 3
+COLOUR_CHANNELS = IUV_CHANNELS = 3
+POSITION_CHANNELS = 3  # x, y, z on the body in T-pose
+CLEARANCE_CHANNELS = 2  # the clearance, and whether any is known
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelConfig:
     """Everything that decides the shape of the networks, and nothing else.
 
-    Source: the paper, Sec. 3; widths from Pix2PixHD's global generator (RenderNet) and U-Net
-    (FeatureNet). Departs from it: `visibility_input` (on) gives FeatureNet the visibility as a
-    fourth channel, because an unseen texel and a mid-grey one are otherwise the same input.
-    Three more are off, and on in `lite`, so that networks learn in hours what to change instead of
-    learning in days to copy. `prefilled` gives FeatureNet a texture whose hidden texels show their
-    mirror image on the body (`mirror_texture`) or else the colours around them (`fill_texture`),
-    and as one more channel which of the two.
-    `colour_shortcut` carries colours past both networks: FeatureNet's first three channels are
-    added to its input's, and RenderNet's drawing to the feature image's first three.
-    `colour_margin` carries those three beyond the body's outline (`spread_colours`), where clothes
-    and hair are.
-    `clearance` tells RenderNet how far those stand off the body in the source (`unfold_clearance`).
-    `geometry` tells both networks where on the body they are, which convolutions cannot see:
-    FeatureNet the position of each texel; RenderNet, on the body and around it, the position and
-    clearance of the place that is nearest, and the distance to the outline (`signed_distance`). Its
-    last convolution reads its input, too: what is as fine as a finger is lost in the layers before.
-
     Attributes:
-        variant: `full`; `no-int` (same networks, trained without the texture loss); `ip` (the map
-            is an inpainted RGB texture); `warp` (the partial texture itself); `warp-cond` (that
+        variant: `full`; `no-int` (the same networks, trained without the texture loss); `ip` (the
+            map is an inpainted RGB texture); `warp` (the partial texture itself); `warp-cond` (that
             and the target IUV).
         feature_channels: d, channels of the feature map for `full` and `no-int`.
-        feature_width: channels of FeatureNet's first block; they double down to 8 times that.
-        render_width: channels of RenderNet's first convolution; they double at each down block.
-        down_blocks, residual_blocks: of RenderNet.
-        texture_size: side of the UV texture in texels, a multiple of 16.
-        image_size: side of the image RenderNet works on in pixels, a multiple of 2**down_blocks.
+        feature_width: Channels of FeatureNet's first block; they double down to 8 times that.
+        render_width: Channels of RenderNet's first convolution; they double at each down block.
+        down_blocks, residual_blocks: How many RenderNet has.
+        texture_size: Side of the UV texture, texels; a multiple of 16.
+        image_size: Side of the image that RenderNet works on, px; a multiple of 2**down_blocks.
         alpha: RenderNet has a fourth output, the person's coverage.
-        visibility_input, prefilled, colour_shortcut, colour_margin, clearance, geometry: see above.
+        visibility_input: FeatureNet reads the visibility as a fourth channel: an unseen texel and a
+            mid-grey one are otherwise the same input.
+        prefilled: Hidden texels of what FeatureNet reads show their mirror image on the body
+            (`mirror_texture`) or else the colours around them (`fill_texture`), and one more
+            channel tells which of the two.
+        colour_shortcut: Colours are carried past both networks: FeatureNet's first three channels
+            are added to its input's, and RenderNet's drawing to the feature image's first three.
+        colour_margin: Those three are carried beyond the body's outline (`spread_colours`), where
+            clothes and hair are.
+        clearance: RenderNet is told how far those stand off the body in the source
+            (`unfold_clearance`).
+        geometry: Both networks are told where on the body they are, which convolutions cannot see:
+            FeatureNet the position of each texel; RenderNet, on the body and around it, position
+            and clearance of the place that is nearest, and the distance to the outline
+            (`signed_distance`). RenderNet's last convolution reads its input, too: what is as fine
+            as a finger is lost in the layers before.
+    Source: the paper, Sec. 3 and 4.4; widths from Pix2PixHD's global generator (RenderNet) and
+        U-Net (FeatureNet). Departs from it: the last seven. `visibility_input` is on; those after
+        it are off, and on in `lite`, so that networks learn in hours what to change instead of
+        learning in days to copy.
     """
 
     variant: Variant = "full"
@@ -91,8 +92,10 @@ class ModelConfig:
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> ModelConfig:
-        """`paper` (RenderNet: 31.5 M parameters, 80.3 GFLOP at 256 x 256) or `lite` (7.9 M, 23.9).
+        """Take a preset, with changes; `PRESETS` lists them.
 
+        RenderNet has 31.5 M parameters and takes 80.3 GFLOP at 256 x 256 as in the `paper`, 7.9 M
+        and 23.9 in `lite`.
         Raises: ConfigError on an unknown name.
         """
         if name not in PRESETS:
@@ -101,14 +104,14 @@ class ModelConfig:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ModelConfig:
-        """The inverse of `to_dict`. Raises: ConfigError on unknown fields or impossible values."""
+        """Invert `to_dict`. Raises: ConfigError on unknown fields or impossible values."""
         unknown = sorted(set(values) - {field.name for field in fields(cls)})
         if unknown:
             raise ConfigError(f"unknown configuration field {', '.join(unknown)}")
         return cls(**values)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, ready for JSON or TOML."""
+        """Give plain values, ready for JSON or TOML."""
         return asdict(self)
 
     @property
@@ -118,8 +121,10 @@ class ModelConfig:
 
     @property
     def finest_texture(self) -> int:
-        """Side of the largest partial texture that is of use: where colours are carried past
-        FeatureNet, twice what that works on."""
+        """Side of the largest partial texture that is of use, texels.
+
+        Where colours are carried past FeatureNet it is twice the side that FeatureNet works on.
+        """
         return self.texture_size * (2 if self.has_feature_net and self.colour_shortcut else 1)
 
     @property
@@ -141,8 +146,7 @@ class ModelConfig:
 
     @property
     def render_inputs(self) -> int:
-        """Channels that RenderNet reads: the feature image, the target IUV for `warp-cond`, and
-        what lies nearest and how far."""
+        """Channels of the feature image, which RenderNet reads, see `feature_image`."""
         iuv = IUV_CHANNELS if self.variant == "warp-cond" else 0
         around = int(self.clearance) + 1 if self.geometry else 0  # positions are in the map
         return self.map_channels + iuv + around

@@ -9,8 +9,8 @@ from torch import Tensor, nn
 
 from nhrr_core.errors import ShapeError
 
-SLOPE = 0.2  # of LeakyReLU
-INITIAL_STD = 0.02  # of the convolutions' weights
+SLOPE = 0.2  # of LeakyReLU, Pix2PixHD's
+INITIAL_STD = 0.02  # of the convolutions' weights, Pix2PixHD's
 
 
 class PatchDiscriminator(nn.Module):
@@ -23,7 +23,7 @@ class PatchDiscriminator(nn.Module):
 
     def __init__(self, *, inputs: int, width: int) -> None:
         super().__init__()
-        # Padding is 2 on every side, so each of stride 1 adds a pixel: Pix2PixHD's, kept.
+        # padding is 2 on every side, so each of stride 1 adds a pixel: Pix2PixHD's, kept
         layers: list[nn.Module] = [nn.Conv2d(inputs, width, 4, stride=2, padding=2)]
         layers += [nn.LeakyReLU(SLOPE, inplace=True)]
         for i, stride in enumerate((2, 2, 1)):
@@ -37,7 +37,7 @@ class PatchDiscriminator(nn.Module):
         self.layers = nn.Sequential(*layers)
 
     def forward(self, pair: Float[Tensor, "B C H W"]) -> Float[Tensor, "B 1 h w"]:
-        """Logits, above 0 for real; sides of about H / 8 and W / 8."""
+        """Compute logits, above 0 for real; sides of about H / 8 and W / 8."""
         return self.layers(pair)
 
 
@@ -48,9 +48,9 @@ class Discriminator(nn.Module):
 
     Args:
         image_channels: 3, or 4 where RenderNet also writes alpha.
-        condition_channels: of the feature image, `ModelConfig.render_inputs`.
-        width: channels of the first convolution.
-        scales: the paper has three.
+        condition_channels: Those of the feature image, `ModelConfig.render_inputs`.
+        width: Channels of the first convolution.
+        scales: How many there are; the paper has three.
     Source: the paper, Sec. 3.4 and 3.5; layers and initial weights from Pix2PixHD. Its features
         between the layers are not returned: the paper has no feature matching.
     """
@@ -67,11 +67,11 @@ class Discriminator(nn.Module):
     def forward(
         self, image: Float[Tensor, "B K H W"], condition: Float[Tensor, "B C h w"]
     ) -> list[Float[Tensor, "B 1 _ _"]]:
-        """Logits of each scale, the finest first; no sigmoid.
+        """Compute each scale's logits, the finest first; no sigmoid.
 
         Args:
-            image: real or generated, in [-1, 1].
-            condition: the feature image of the same pose, `NeuralReRenderer.feature_image`.
+            image: Real or generated, in [-1, 1].
+            condition: The feature image of the same pose, `NeuralReRenderer.feature_image`.
         Raises: ShapeError if the two differ in batch or size.
         """
         if image.shape[0] != condition.shape[0] or image.shape[2:] != condition.shape[2:]:

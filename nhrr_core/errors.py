@@ -8,7 +8,7 @@ NhrrError (ValueError)
 
 
 class NhrrError(ValueError):
-    """Base of everything `nhrr_core` raises on purpose."""
+    """The base of everything that `nhrr_core` raises on purpose."""
 
 
 class ConfigError(NhrrError):
@@ -20,4 +20,4 @@ class IuvError(NhrrError):
 
 
 class ShapeError(NhrrError):
-    """Tensor shapes do not fit; the message names the shapes."""
+    """Tensors' shapes do not fit each other, or the network; the message names them."""

@@ -28,14 +28,17 @@ EPSILON = 1e-5  # of torch.nn.InstanceNorm2d
 
 
 class FastRenderNet(nn.Module):
-    """An inference twin of a RenderNet; its weights are copies, later changes have no effect.
+    """A RenderNet's twin for inference; its weights are copies, later changes have no effect.
 
     Compiled, it takes about half a minute at the first call with each batch size and image size;
     torch keeps the result on disk for later processes.
 
     Args:
-        winograd: None decides by the CPU.
-        compiled: through torch.compile; off, it is for tests and slower than `RenderNet`.
+        dtype: What the convolutions' factors are rounded to.
+        winograd: Whether the residual blocks run by Winograd's algorithm; None: the CPU decides.
+        compiled: Whether to use torch.compile; off, it is for tests and slower than `RenderNet`.
+    Attributes:
+        multiple: What the sides of an image must be multiples of.
     """
 
     def __init__(
@@ -74,9 +77,9 @@ class FastRenderNet(nn.Module):
             self.trunk = torch.compile(self.trunk, dynamic=False, options=frozen)
 
     def forward(self, features: Float[Tensor, "B C H W"]) -> Float[Tensor, "B K H W"]:
-        """A frame in [-1, 1], float32; H and W multiples of `self.multiple`."""
-        # One sample's large activations fit the cache, a batch's do not: only the trunk, whose
-        # matrix products want rows, sees the whole batch.
+        """Draw a frame in [-1, 1], float32; H and W are multiples of `multiple`."""
+        # one sample's large activations fit the cache, a batch's do not: only the trunk, whose
+        # matrix products want rows, sees the whole batch
         encoded = torch.cat([self.encoder(sample) for sample in features.split(1)])
         inputs = features.split(1) if self.shortcut else [None] * len(features)
         trunk = self.trunk(encoded).split(1)
@@ -84,7 +87,7 @@ class FastRenderNet(nn.Module):
 
 
 class _Encoder(nn.Module):
-    """First and down-sampling convolutions: B x C x H x W to channels-last rows of features."""
+    """The first and the down-sampling convolutions: B x C x H x W to B x h x w x C'."""
 
     def __init__(self, convolutions: list[nn.Conv2d], dtype: torch.dtype) -> None:
         super().__init__()
@@ -100,7 +103,7 @@ class _Encoder(nn.Module):
 
 
 class _Trunk(nn.Module):
-    """The residual blocks, B x H x W x C float32 throughout."""
+    """The residual blocks, B x H x W x C, float32 throughout."""
 
     def __init__(self, convolutions: list[nn.Conv2d], dtype: torch.dtype, winograd: bool) -> None:
         super().__init__()
@@ -120,9 +123,9 @@ class _Trunk(nn.Module):
 
 
 class _Decoder(nn.Module):
-    """Up-sampling convolutions and the last one: B x H x W x C to B x K x H x W.
+    """The up-sampling convolutions and the last one: B x h x w x C' to B x K x H x W.
 
-    What the network read goes into the last one, too, where it is given.
+    The last one also reads what the network did, where it is given.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""FeatureNet f: a U-Net that completes a partial texture to a full UV feature map."""
+"""FeatureNet f: a U-Net that completes a partial texture to a full UV feature map, F_s = f(T_s)."""
 
 from __future__ import annotations
 
@@ -22,11 +22,16 @@ def _two_convolutions(inputs: int, outputs: int) -> nn.Sequential:
 
 
 class FeatureNet(nn.Module):
-    """Four down blocks (max-pool, two convolutions), four up blocks (bilinear, skip, likewise).
+    """Four down blocks of two convolutions and max-pool, two convolutions, four up blocks.
 
-    A 256 x 256 texture reaches 16 x 16 in the middle.
-    Source: the paper, Sec. 3.2. Departs from it: no; widths and batch normalisation, which it does
-    not give, are the usual U-Net's.
+    An up block is bilinear up-sampling and two convolutions, which also read what the way down had
+    at that size. Convolutions are 3x3 with batch norm and ReLU, but for the 1x1 that writes the
+    map. A 256 x 256 texture reaches 16 x 16 in the middle.
+
+    Args:
+        width: Channels at full size; they double at each halving but the last.
+    Source: the paper, Sec. 3.2, Eq. 1. Departs from it: no; what it does not give (skips, widths,
+        norm) is the usual U-Net's (Ronneberger et al., MICCAI 2015).
     """
 
     def __init__(self, *, inputs: int, outputs: int, width: int) -> None:
@@ -43,7 +48,7 @@ class FeatureNet(nn.Module):
         self.exit = nn.Conv2d(widths[0], outputs, 1)
 
     def forward(self, texture: Float[Tensor, "B C T T"]) -> Float[Tensor, "B D T T"]:
-        """The feature map of a texture (with or without its visibility); T a multiple of 16."""
+        """Complete a texture, and whatever is known of its texels; T is a multiple of 16."""
         skips = [self.entry(texture)]
         for block in self.down:
             skips.append(block(F.max_pool2d(skips[-1], 2)))

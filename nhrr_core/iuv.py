@@ -16,7 +16,6 @@ from nhrr_core.errors import IuvError, ShapeError
 PART_COUNT = 24
 
 ALL_PARTS = tuple(range(1, PART_COUNT + 1))
-
 PART_NAMES: tuple[str, ...] = (
     "background",
     "torso-back",
@@ -62,9 +61,8 @@ PART_GROUPS: dict[str, tuple[int, ...]] = {
 def check_iuv(iuv: Tensor) -> None:
     """Hold a tensor to the convention.
 
-    Raises:
-        ShapeError: unless it is B x 3 x H x W.
-        IuvError: unless it is uint8 with every part index at most 24.
+    Raises: ShapeError unless it is B x 3 x H x W; IuvError unless it is uint8 with every part index
+        at most 24.
     """
     if iuv.ndim != 4 or iuv.shape[1] != 3:
         raise ShapeError(f"an IUV tensor is B x 3 x H x W, not {list(iuv.shape)}")
@@ -76,13 +74,13 @@ def check_iuv(iuv: Tensor) -> None:
 
 
 def keep_parts(iuv: UInt8[Tensor, "B 3 H W"], parts: tuple[int, ...]) -> UInt8[Tensor, "B 3 H W"]:
-    """The IUV with every pixel of another part turned into background (0, 0, 0)."""
+    """Turn every pixel of another part into background, (0, 0, 0)."""
     allowed = torch.zeros(256, dtype=torch.uint8, device=iuv.device)
     allowed[list(parts)] = 1
     return iuv * allowed[iuv[:, :1].long()]
 
 
 def normalise_iuv(iuv: UInt8[Tensor, "B 3 H W"]) -> Float[Tensor, "B 3 H W"]:
-    """IUV as network input: I / 24, U / 255 and V / 255, each brought to [-1, 1]."""
+    """Bring I / 24, U / 255 and V / 255 to [-1, 1] each, as network input."""
     scale = torch.tensor([2 / PART_COUNT, 2 / 255, 2 / 255], device=iuv.device)
     return iuv * scale[:, None, None] - 1

@@ -1,4 +1,4 @@
-"""The paper's losses (Sec. 3.5), as functions of tensors; every one is a scalar.
+"""The paper's losses (Sec. 3.5), as functions of tensors; each is a scalar.
 
 A mean over nothing (no texel seen, no face seen) is 0 and passes no gradient.
 """
@@ -22,9 +22,9 @@ from nhrr_core.errors import ConfigError, ShapeError
 class LossWeights:
     """The lambdas of the generator's loss.
 
-    Source: the paper, Sec. 3.5. Departs from it: `alpha`, of the optional coverage channel, is this
-    project's.
     Raises: ConfigError if one is negative or not finite.
+    Source: the paper, Sec. 3.5. Departs from it: `alpha`, of the optional coverage channel, is this
+        project's.
     """
 
     perceptual: float = 10.0
@@ -44,12 +44,12 @@ class LossWeights:
 def generator_loss(
     terms: Mapping[str, Float[Tensor, ""]], weights: LossWeights
 ) -> Float[Tensor, ""]:
-    """L_G, the weighted sum of the terms given; a variant leaves out those that it does not have.
+    """Compute L_G, the weighted sum of its terms; a variant leaves out those that it has not.
 
     Args:
-        terms: by the names of the fields of `LossWeights`.
+        terms: By the names of the fields of `LossWeights`.
     Raises: ConfigError on a term without a weight, or on no term at all.
-    Source: the paper, Sec. 3.5, the last equation.
+    Source: the paper, Sec. 3.5, Eq. 7.
     """
     known = {field.name for field in fields(weights)}
     unknown = sorted(set(terms) - known)
@@ -62,12 +62,12 @@ def generator_loss(
 def discriminator_loss(
     real: Sequence[Float[Tensor, "B 1 _ _"]], fake: Sequence[Float[Tensor, "B 1 _ _"]]
 ) -> Float[Tensor, ""]:
-    """Binary cross-entropy of real pairs called real and generated ones called generated.
+    """Compute D's loss: binary cross-entropy of real images called real and generated ones fake.
 
     1/2 * sum over scales of mean(-log s(real)) + mean(-log(1 - s(fake))), s the logistic function.
 
     Args:
-        real, fake: the logits of `Discriminator`, the generated image (and the condition) detached.
+        real, fake: The logits of `Discriminator`, the generated image (and the condition) detached.
     Raises: ShapeError if they have different numbers of scales, or none.
     Source: the paper, Sec. 3.5; the sum over scales and the half from Pix2PixHD.
     """
@@ -78,7 +78,7 @@ def discriminator_loss(
 
 
 def adversarial_loss(fake: Sequence[Float[Tensor, "B 1 _ _"]]) -> Float[Tensor, ""]:
-    """L_adv of the generator: binary cross-entropy of generated images called real.
+    """Compute L_adv of the generator: binary cross-entropy of generated images called real.
 
     Sum over scales of mean(-log s(fake)), the form that does not saturate.
 
@@ -94,13 +94,13 @@ def perceptual_loss(
     truth: Sequence[Float[Tensor, "B _ _ _"]],
     weights: Sequence[float],
 ) -> Float[Tensor, ""]:
-    """L_p: how far the activations of a frozen network are apart, layer by layer.
+    """Compute L_p: how far the activations of a frozen network are apart, layer by layer.
 
     Sum over layers j of weights[j] * mean|p_j(generated) - p_j(truth)|.
 
     Args:
-        generated, truth: activations of the same layers; take the truth's without gradients.
-        weights: one a layer. Pix2PixHD gives VGG-19's relu1_1 to relu5_1 the weights 1/32, 1/16,
+        generated, truth: Activations of the same layers; take the truth's without gradients.
+        weights: One a layer. Pix2PixHD gives VGG-19's relu1_1 to relu5_1 the weights 1/32, 1/16,
             1/8, 1/4, 1; the paper's equation, read literally, has 1 for all.
     Raises: ShapeError if the numbers of layers and weights differ, or are 0, or if the two
         activations of a layer differ in shape.
@@ -121,14 +121,14 @@ def texture_loss(
     source: tuple[Float[Tensor, "B 3 T T"], Float[Tensor, "B 1 T T"]],
     target: tuple[Float[Tensor, "B 3 T T"], Float[Tensor, "B 1 T T"]],
 ) -> Float[Tensor, ""]:
-    """L_tex: the first three channels of the feature map are the colours of the person.
+    """Compute L_tex, which makes the feature map's first three channels the person's colours.
 
     The sum of two l1 distances, to the partial texture of the source and to that of the target,
-    each a mean over colours and over the texels visible in any image of the batch.
+    each a mean over colours and over all visible texels of the batch.
 
     Args:
-        feature_map: of the source, D at least 3.
-        source, target: texture and visibility (0 or 1) as `extract_texture` returns them.
+        feature_map: That of the source, D at least 3.
+        source, target: Texture and visibility (0 or 1) as `extract_texture` returns them.
     Raises: ShapeError if the feature map has fewer than three channels.
     Source: the paper, Sec. 3.5, intermediate in-painting loss. Departs from it: no.
     """
@@ -141,7 +141,7 @@ def texture_loss(
 def face_identity_loss(
     generated: Float[Tensor, "B E"], truth: Float[Tensor, "B E"], seen: Bool[Tensor, " B"]
 ) -> Float[Tensor, ""]:
-    """L_face: mean absolute difference of two faces' embeddings, over the images with a face.
+    """Compute L_face: the mean absolute difference of embeddings, over the images with a face.
 
     Args:
         generated, truth: N_face of the face crops; take the truth's without gradients.
@@ -156,7 +156,7 @@ def face_identity_loss(
 def alpha_loss(
     alpha: Float[Tensor, "B 1 H W"], coverage: Float[Tensor, "B 1 H W"]
 ) -> Float[Tensor, ""]:
-    """Mean absolute error of RenderNet's fourth output, both in [-1, 1] (1 is the person).
+    """Compute the mean absolute error of RenderNet's fourth output, in [-1, 1] (1 is the person).
 
     Source: this project's; the paper renders no alpha.
     """

@@ -40,8 +40,9 @@ class NeuralReRenderer(nn.Module):
     """g(r(f(T_s), P_t)): FeatureNet, sampler and RenderNet of one variant.
 
     Convention: photos are RGB in [-1, 1], IUV is uint8 (I, U, V), frames are RGB in [-1, 1]; with
-    `config.alpha` a fourth channel holds the coverage, likewise in [-1, 1].
-    Source: the paper, Sec. 3, Eq. 4.
+    `config.alpha` a fourth channel holds the coverage, in [-1, 1], 1 being the person. A feature
+    map has D channels, a feature image C, a frame K.
+    Source: the paper, Sec. 3, Eq. 4. Departs from it: what `ModelConfig` says.
 
     Example:
         >>> model = NeuralReRenderer(ModelConfig.preset("lite")).eval()
@@ -85,13 +86,13 @@ class NeuralReRenderer(nn.Module):
         if config.geometry:
             position = layout.position.permute(2, 0, 1)[None]
             tables["places"] = position / position.abs().amax((2, 3), keepdim=True)
-        for name, table in tables.items():
+        for name, table in tables.items():  # constants: they move with the model, unsaved
             self.register_buffer(name, table, persistent=False)
 
     def encode(
         self, photo: Float[Tensor, "B 3 H W"], iuv: UInt8[Tensor, "B 3 H W"]
     ) -> Float[Tensor, "B D T T"]:
-        """The UV feature map F_s of a photo of any size. Raises: ShapeError, IuvError."""
+        """Compute the UV feature map F_s of a photo of any size. Raises: ShapeError, IuvError."""
         return self.encode_texture(
             *extract_texture(photo, iuv, self.charts, self.config.texture_size)
         )
@@ -102,13 +103,14 @@ class NeuralReRenderer(nn.Module):
         visibility: Float[Tensor, "B 1 T T"],
         clearance: Float[Tensor, "B 2 128 128"] | None = None,
     ) -> Float[Tensor, "B D T T"]:
-        """The UV feature map of a partial texture; for the warp variants, that texture itself.
+        """Compute the UV feature map of a partial texture; for the warp variants it is the texture.
 
         With `config.colour_shortcut` the texture may be a multiple of `config.texture_size`:
         FeatureNet works at its own size, and what it adds to the colours is added to the finer.
 
         Args:
-            clearance: `unfold_clearance`'s, with `config.clearance`; None: nothing is known of it.
+            visibility: 1 where the texture shows something, else 0.
+            clearance: What `unfold_clearance` made; None: nothing is known of it.
         Raises: ShapeError if its side is not a multiple of 16.
         """
         carried = [self._complete(texture, visibility)]
@@ -140,7 +142,7 @@ class NeuralReRenderer(nn.Module):
             return self.feature_net(torch.cat(own, dim=1))
         factor, rest = divmod(texture.shape[-1], self.config.texture_size)
         if rest:
-            factor = 1
+            factor = 1  # a size of its own, which FeatureNet works on as it is
         if factor > 1:
             own = self._filled(*shrink_texture(texture, visibility, factor))
         feature_map = self.feature_net(torch.cat(own, dim=1))
@@ -171,8 +173,12 @@ class NeuralReRenderer(nn.Module):
     def feature_image(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
     ) -> Float[Tensor, "B C H W"]:
-        """What RenderNet sees: the sampled map, the target IUV for `warp-cond`, and with
-        `config.geometry` what lies nearest and how far the outline is, in UNIT_PIXELS."""
+        """Compute the feature image R_s->t that RenderNet reads.
+
+        Its channels are the sampled map, the target IUV for `warp-cond`, and with `config.geometry`
+        clearance and position of the place that is nearest, and the distance to the outline, in
+        UNIT_PIXELS.
+        """
         config = self.config
         features = sample_features(feature_map, target_iuv, self.charts)
         own, places = features, features[:, :0]
@@ -181,7 +187,7 @@ class NeuralReRenderer(nn.Module):
         clearance = own[:, config.feature_outputs :][:, :1]
         if config.clearance:
             unit = pixels_per_texel(target_iuv, self.charts) * (UNIT_TEXELS / UNIT_PIXELS)
-            clearance *= unit[:, None, None, None]
+            clearance *= unit[:, None, None, None]  # in place, so that `own` has it as well
         image = [own]
         if config.variant == "warp-cond":
             image.append(normalise_iuv(target_iuv))
@@ -195,7 +201,7 @@ class NeuralReRenderer(nn.Module):
     def render(
         self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
     ) -> Float[Tensor, "B K H W"]:
-        """Frames of the source in the target poses, one feature map for all or one for each.
+        """Render frames of the source in the target poses, one feature map for all or one for each.
 
         Raises: ShapeError if H or W is not a multiple of 2**down_blocks.
         """
@@ -210,7 +216,7 @@ class NeuralReRenderer(nn.Module):
     def blend(
         self, drawn: Float[Tensor, "B K H W"], feature_image: Float[Tensor, "B C H W"]
     ) -> Float[Tensor, "B K H W"]:
-        """The frame, from what RenderNet drew of a feature image.
+        """Make the frame of what RenderNet drew of a feature image.
 
         With `config.colour_shortcut` the drawing is added to the image's colours, with
         `config.colour_margin` also to those carried beyond the body's outline.
@@ -220,12 +226,14 @@ class NeuralReRenderer(nn.Module):
         painted, alpha = drawn.tensor_split([COLOUR_CHANNELS], dim=1)
         colours = feature_image[:, :COLOUR_CHANNELS].clamp(-1, 1)
         if self.config.colour_margin:
+            # where the distance to the outline is negative, or else anything was sampled at all
             body = (
                 feature_image[:, -1:] < 0
                 if self.config.geometry
                 else (feature_image != 0).any(dim=1, keepdim=True)
             )
             colours = spread_colours(colours, body, MARGIN_LEVELS)
+        # twice: tanh lies in [-1, 1], the difference of two colours in [-2, 2]
         return torch.cat([(colours + 2 * painted).clamp(-1, 1), alpha], dim=1)
 
     def forward(

@@ -1,4 +1,4 @@
-"""RenderNet g: a feature image becomes a frame."""
+"""RenderNet g: a feature image becomes a frame, I = g(R)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 LAST_LAYERS = 3
-"""Padding, 7x7 and tanh."""
+"""How many there are after the norms: padding, 7x7 and tanh."""
 
 
 class ResidualBlock(nn.Module):
-    """x + (3x3, norm, ReLU, 3x3, norm), reflected at the border."""
+    """The input plus 3x3, norm, ReLU, 3x3, norm of it; reflected at the border."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -32,10 +32,11 @@ class ResidualBlock(nn.Module):
 class RenderNet(nn.Module):
     """Pix2PixHD's global generator: 7x7, down blocks, residual blocks, up blocks, 7x7, tanh.
 
-    Source: the paper, Sec. 3.4; layer shapes from Pix2PixHD (Wang et al., CVPR 2018).
-
     Args:
-        shortcut: the last convolution reads the network's input, too.
+        width: Channels of the first convolution; they double at each down block.
+        shortcut: Whether the last convolution reads the network's input, too.
+    Source: the paper, Sec. 3.4, Eq. 3; layer shapes from Pix2PixHD (Wang et al., CVPR 2018).
+        Departs from it: `shortcut`, off by default.
     """
 
     def __init__(
@@ -68,7 +69,7 @@ class RenderNet(nn.Module):
         self.layers = nn.Sequential(*layers)
 
     def forward(self, features: Float[Tensor, "B C H W"]) -> Float[Tensor, "B K H W"]:
-        """A frame in [-1, 1]; H and W multiples of 2**down_blocks."""
+        """Draw a frame in [-1, 1]; H and W are multiples of 2**down_blocks."""
         if not self.shortcut:
             return self.layers(features)
         drawn = self.layers[:-LAST_LAYERS](features)

@@ -1,4 +1,4 @@
-"""Screen space from UV space: the paper's rendering operation r."""
+"""Screen space from UV space: the paper's rendering operation r, and what lies around a body."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torch import Tensor
 from nhrr_core.errors import ShapeError
 from nhrr_core.uv_layout import texture_coordinates
 
-TINY = 1e-6
+TINY = 1e-6  # far below the smallest weight that is not 0, a sixteenth
 
 
 def sample_features(
@@ -23,10 +23,10 @@ def sample_features(
     Convention: bilinear between texel centres; beyond the outermost centres the map is constant.
 
     Args:
-        feature_map: one map per image, or a single one (M = 1) for the whole batch.
-        iuv: target IUV, uint8, (I, U, V).
-        charts: the lookup table, `UVLayout.charts`.
-    Returns: the feature image; exactly 0 where the part index is 0.
+        feature_map: One map per image, or a single one (M = 1) for the whole batch.
+        iuv: The target's, (I, U, V).
+        charts: The lookup table, `UVLayout.charts`.
+    Returns: The feature image; exactly 0 where the part index is 0.
     Raises: ShapeError if the number of maps is neither 1 nor that of the images.
     Source: the paper, Sec. 3.3, Eq. 2. Departs from it: no.
     """
@@ -36,7 +36,7 @@ def sample_features(
     image = feature_map.new_zeros(images, feature_map.shape[1], *iuv.shape[2:])
     for number, own_map in enumerate(feature_map.split(1)):
         shown = slice(None) if maps == 1 else slice(number, number + 1)
-        index, row, column = (iuv[shown, 0] > 0).nonzero(as_tuple=True)  # often a tenth of it
+        index, row, column = (iuv[shown, 0] > 0).nonzero(as_tuple=True)  # often a tenth of all
         body = iuv[shown][index, :, row, column].T[None, :, None]  # 1 x 3 x 1 x N
         grid = texture_coordinates(body, charts) * 2 - 1
         sampled = F.grid_sample(
@@ -56,13 +56,14 @@ def spread_colours(
     """Carry colours beyond the outline of what is known, each place a mean of what lies nearest.
 
     Args:
-        known: where they are known; there they stay as they are.
-        levels: how often means of 2 x 2 are taken; colours reach 2**(levels - 1) pixels at least.
-    Returns: the colours; 0 beyond their reach.
+        known: Where they are known; there they stay as they are.
+        levels: How often means of 2 x 2 are taken; colours reach 2**(levels - 1) pixels at least.
+    Returns: The colours; 0 beyond their reach.
     Source: the pull-push of Gortler et al., "The Lumigraph" (SIGGRAPH 1996), Sec. 4.2.
     """
     height, width = known.shape[2:]
     padding = 0, -width % 2**levels, 0, -height % 2**levels
+    # the last channel counts: means are of what is known alone
     weighted = F.pad(torch.cat([colours, torch.ones_like(colours[:, :1])], 1) * known, padding)
     means = [weighted]
     for _ in range(levels):
@@ -77,19 +78,19 @@ def spread_colours(
 
 
 def signed_distance(inside: Bool[Tensor, "B 1 H W"], reach: int) -> Float[Tensor, "B 1 H W"]:
-    """Distance to the outline in pixels, negative inside; at most `reach` either way.
+    """Measure the distance to the outline, px: negative inside, at most `reach` either way.
 
     The outline runs half-way between the centres of pixels inside and outside, so that no distance
     is 0. An image without an outline is at `reach` everywhere.
 
     Args:
-        reach: at most 127, so that no sum of two squares exceeds 16 bits.
+        reach: At most 127, so that no sum of two squares exceeds 16 bits.
     Source: the exact distance transform of Felzenszwalb and Huttenlocher (2012), whose minimum over
     parabolas is taken here over those within reach.
     """
     far = torch.tensor((reach + 1) ** 2, dtype=torch.int16, device=inside.device)
     squared = torch.cat([inside, ~inside], dim=1).logical_not() * far  # half of float32's time
-    for axis in (2, 3):
+    for axis in (2, 3):  # squares add up, so one axis after the other is exact
         nearest, length = squared.clone(), squared.shape[axis]
         for step in range(1, min(reach + 1, length)):
             away = squared + step**2

@@ -1,4 +1,7 @@
-"""UV space from screen space: the partial texture of what a photo shows."""
+"""UV space from screen space: the partial texture of what a photo shows, and guesses at the rest.
+
+The numbers below are this project's, chosen by eye.
+"""
 
 from __future__ import annotations
 
@@ -12,25 +15,25 @@ from nhrr_core.iuv import check_iuv
 from nhrr_core.uv_layout import CHART_SIZE, chart_index, texture_coordinates
 
 MAX_CHART_STEP = 0.15
-"""Neighbouring pixels whose U or V differ by more lie on separate pieces of the surface."""
+"""Neighbouring pixels whose U or V, in [0, 1], differ by more lie on separate pieces of surface."""
 
 MAX_STRETCH = 1 / 16
-"""So do neighbours that land further apart in the texture, as a share of its side."""
+"""Neighbours that land further apart in the texture, as a share of its side, do so, too."""
+
+MAX_ENTRY_STEP = 0.03
+"""Neighbouring entries of the lookup table further apart lie on two sides of a texture seam."""
 
 SAMPLES_PER_TEXEL = 3.0
-"""Density of the points that fill between pixels, so that none is missed where charts bend."""
+"""How dense points fill between pixels along each axis: no texel is missed where charts bend."""
 
 FILL_FROM, FILL_TO = 32, 64
-"""Places along a side of the texture whose colours are spread, and to which."""
+"""How many places along a side of the texture colours are spread from, and how many to."""
 
 FILL_METRES = 0.02
 """Distances on the body below this count about alike."""
 
 PLACE_METRES = 0.12
 """Texels of a place lie within that of its middle on the body, unless they are of another part."""
-
-MAX_ENTRY_STEP = 0.03
-"""Neighbouring entries of the lookup table further apart lie on two sides of a texture seam."""
 
 
 def extract_texture(
@@ -45,11 +48,14 @@ def extract_texture(
     the texels between the centres of four neighbouring pixels of one part are interpolated
     bilinearly from those; nothing is filled outside such a quad.
 
-    Convention: image and IUV have the same size in pixels, whatever it is; values pass unchanged.
-    Returns: texture, 0 where unseen, and visibility, 1 where seen and 0 elsewhere. Both
-        differentiable with respect to the image.
-    Raises: ShapeError, IuvError.
-    Source: the paper, Sec. 3.1; the filling between pixels is this project's.
+    Convention: image and IUV have the same size, whatever it is; values pass unscaled.
+
+    Args:
+        size: T, side of the texture in texels.
+    Returns: The texture, 0 where unseen and differentiable with respect to the image; and the
+        visibility, 1 where seen and 0 elsewhere.
+    Raises: ShapeError if image and IUV differ in batch or size; IuvError.
+    Source: the paper, Sec. 3.1. Departs from it: the filling between pixels is this project's.
     """
     check_iuv(iuv)
     if image.shape[0] != iuv.shape[0] or image.shape[2:] != iuv.shape[2:]:
@@ -69,7 +75,7 @@ def extract_texture(
         more_total, more_count = _scatter(points, texel, texels)
         fill_total, fill_count = fill_total + more_total, fill_count + more_count
 
-    hit = count > 0
+    hit = count > 0  # what is interpolated only fills where no pixel landed
     total = torch.where(hit[:, None], total, fill_total)
     count = torch.where(hit, count, fill_count)
     texture = total / count.clamp_min(1)[:, None]
@@ -83,11 +89,11 @@ def extract_texture(
 def shrink_texture(
     texture: Float[Tensor, "*B C T T"], visibility: Float[Tensor, "*B 1 T T"], factor: int
 ) -> tuple[Float[Tensor, "*B C t t"], Float[Tensor, "*B 1 t t"]]:
-    """A coarser partial texture: each texel the mean of those seen in its place, seen where any is.
+    """Make a partial texture coarser: a texel is the mean of those seen in its place, if any is.
 
     Args:
         texture: 0 where it is not seen.
-        factor: t = T / factor.
+        factor: How many times; t = T / factor.
     """
     if factor == 1:
         return texture, visibility
@@ -99,9 +105,8 @@ def shrink_texture(
 def merge_textures(
     layers: list[tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]],
 ) -> tuple[Float[Tensor, "B C T T"], Float[Tensor, "B 1 T T"]]:
-    """The union of partial textures whose occupancies are made to exclude each other.
+    """Unite partial textures, each with its visibility; where two claim a texel, the later wins.
 
-    Later layers win where two claim a texel.
     Source: the paper, Sec. 4.5 (garment transfer).
     """
     texture, visibility = layers[0]
@@ -129,14 +134,15 @@ def mirror_texture(
     other side's other face.
 
     Args:
-        side_twin, depth_twin: of `UVLayout`.
-    Returns: the texture, 0 where neither a texel nor a mirror image of it is visible; and 1 where
+        side_twin, depth_twin: Those of `UVLayout`.
+    Returns: The texture, 0 where neither a texel nor a mirror image of it is visible; and 1 where
         one of them is.
     Source: this project's.
     """
     size = texture.shape[-1]
     side, depth = (_resize_twins(twin, size) for twin in (side_twin, depth_twin))
     colours, shown = texture.flatten(2), visibility.flatten(2) > 0
+    # side again: by then the side twin has got the colours of its own other face
     for twin in (side, depth, side):
         gain = ~shown & shown[..., twin]
         colours = torch.where(gain, colours[..., twin], colours)
@@ -152,14 +158,14 @@ def fill_texture(
 ) -> Float[Tensor, "B C T T"]:
     """Give texels that show nothing a mean of the colours around them on the body.
 
-    It is one for each FILL_TO x FILL_TO-th of the texture, from FILL_FROM x FILL_FROM means of what
-    is shown: it tells colours, not patterns.
+    There is one for each of FILL_TO x FILL_TO places, made of the means of what is shown in
+    FILL_FROM x FILL_FROM places: it tells colours, not patterns.
 
     Args:
         shown: 1 where the texture shows something; such texels stay as they are.
-        position: of `UVLayout`.
-        surroundings: `measure_surroundings(position)`.
-    Returns: the texture; still 0 everywhere where nothing at all is shown.
+        position: That of `UVLayout`.
+        surroundings: What `measure_surroundings` makes of it.
+    Returns: The texture; still 0 everywhere where nothing at all is shown.
     Source: this project's; inverse distance weighting is Shepard's (1968).
     """
     counted = shown * _lie_at_their_place(position, texture.shape[-1])
@@ -173,12 +179,13 @@ def fill_texture(
 
 
 def measure_surroundings(position: Float[Tensor, "256 256 3"]) -> Float[Tensor, "N M"]:
-    """How much each of FILL_FROM**2 places of the texture counts for each of FILL_TO**2.
+    """Weigh how much each of FILL_FROM**2 places of the texture counts for each of FILL_TO**2.
 
-    Falls with the sixth power of their distance on the body, so that the nearest decide.
+    With their distance d on the body the weight is (m^2 / (d^2 + m^2))^3, m being FILL_METRES: it
+    falls with the sixth power, so that the nearest decide.
 
     Args:
-        position: of `UVLayout`, in metres.
+        position: That of `UVLayout`, in metres.
     """
     given, wanted = (_places(position, count).reshape(-1, 3) for count in (FILL_FROM, FILL_TO))
     squared = torch.cdist(given, wanted).square()
@@ -230,7 +237,10 @@ def _corners(x: Tensor) -> Tensor:
 def _quads_by_steps(
     iuv: UInt8[Tensor, "B 3 H W"], place: Float[Tensor, "B H W 2"], size: int
 ) -> list[tuple[int, Int64[Tensor, "Q 3"]]]:
-    """Quads to fill, as (image, row, column) of their first corner, by points along a side."""
+    """Quads to fill, as (image, row, column) of their first corner, by points along a side.
+
+    Those of one number of points are filled at once; it is a power of two, so that groups are few.
+    """
     part, u, v = (_corners(channel) for channel in iuv.int().unbind(1))
     step = torch.maximum(u.amax(0) - u.amin(0), v.amax(0) - v.amin(0))
     corners = _corners(place)
@@ -256,7 +266,7 @@ def _fill_points(
     size: int,
 ) -> tuple[Float[Tensor, "N C"], Int64[Tensor, " N"]]:
     """Colours and texels of steps x steps points spread evenly inside each quad."""
-    precise = torch.promote_types(colours.dtype, torch.float32)
+    precise = torch.promote_types(colours.dtype, torch.float32)  # float16 is too coarse for places
     line = (torch.arange(steps, device=iuv.device, dtype=precise) + 0.5) / steps
     y, x = (axis.reshape(-1) for axis in torch.meshgrid(line, line, indexing="ij"))
     weights = _bilinear(y, x)
@@ -283,7 +293,7 @@ def _place_between_entries(
     charts: Float[Tensor, "24 256 256 2"], part: Int64[Tensor, "Q P"], uv: Float[Tensor, "Q P 2"]
 ) -> Float[Tensor, "Q P 2"]:
     """Texture coordinates of fractional (U, V): bilinear in the table, nearest across a seam."""
-    low = uv.floor().clamp(0, CHART_SIZE - 2)
+    low = uv.floor().clamp(0, CHART_SIZE - 2)  # 255 has no entry above it
     (right, down), (u, v) = (uv - low).unbind(-1), low.long().unbind(-1)
     table = charts.view(-1, 2)
     first = chart_index(part, u, v)

@@ -27,7 +27,7 @@ Matrix = list[list[Fraction]]
 
 
 def cook_toom() -> tuple[Matrix, Matrix, Matrix]:
-    """Exact (A, G, B) with conv(x, w) = A [(G w) * (B x)] for a filter w of 3 taps.
+    """Compute exact (A, G, B) with conv(x, w) = A [(G w) * (B x)] for a filter w of 3 taps.
 
     Returns: A of TILE x SPAN, G of SPAN x 3, B of SPAN x SPAN.
     """
@@ -39,6 +39,7 @@ def cook_toom() -> tuple[Matrix, Matrix, Matrix]:
         scale = reduce(lambda product, q: product * (p - q), others, Fraction(1))
         weight.append([p**k / scale for k in range(3)])
         signal.append([*_polynomial(others), Fraction(0)])
+    # the point at infinity: the filter's last tap
     weight.append([Fraction(0), Fraction(0), Fraction(1)])
     signal.append(_polynomial(_POINTS))
     return output, weight, signal
@@ -61,7 +62,7 @@ _OUTPUT, _WEIGHT, _SIGNAL = cook_toom()
 def transform_weight(
     weight: Float[Tensor, "O I 3 3"], dtype: torch.dtype
 ) -> Float[Tensor, "P I O"]:
-    """A filter as SPAN * SPAN matrices; computed in float64, rounded once."""
+    """Transform a filter to P = SPAN * SPAN matrices; computed in float64, rounded once."""
     g = torch.tensor([[float(x) for x in row] for row in _WEIGHT], dtype=torch.float64)
     transformed = torch.einsum("xi,yj,ocij->xyco", g, g, weight.detach().double().cpu())
     return transformed.flatten(0, 1).to(weight.device, dtype).contiguous()
@@ -70,11 +71,11 @@ def transform_weight(
 def winograd_convolution(
     padded: Float[Tensor, "B Hp Wp I"], weight: Float[Tensor, "P I O"]
 ) -> Float[Tensor, "B H W O"]:
-    """The 3x3 convolution of an input padded by 1, channels last, float32.
+    """Convolve an input padded by 1 with a 3x3 filter, channels last, float32.
 
     Args:
         padded: H + 2 by W + 2, H and W multiples of TILE.
-        weight: of `transform_weight`; the product runs in its type.
+        weight: What `transform_weight` makes of the filter; the product runs in its type.
     """
     batch, height, width = padded.shape[0], padded.shape[1] - 2, padded.shape[2] - 2
     products = torch.bmm(_transform_signal(padded, weight.dtype), weight).float()

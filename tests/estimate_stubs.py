@@ -1,4 +1,4 @@
-"""Estimators that see coloured rectangles, instead of ones that see people."""
+"""Estimators that see coloured rectangles, and a network that says what it is told."""
 
 from __future__ import annotations
 
@@ -7,18 +7,17 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 import torch
 from torch import Tensor, nn
 
-from motion_transfer.estimate.body_fit import fit_landmarks
-from motion_transfer.estimate.interface import (
-    LANDMARK,
-    LANDMARK_COUNT,
-    Box,
-    Landmarks,
-    PersonEstimate,
-)
-from motion_transfer.estimate.proportions import BodyFit
+from motion_transfer.drawing.person import Box
+from motion_transfer.errors import InputError
+from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_landmarks
+from motion_transfer.estimate.interface import LANDMARK, LANDMARK_COUNT, Landmarks, PersonEstimate
+from motion_transfer.estimate.iuv.network import PARTS, IuvLogits
+from motion_transfer.estimate.models import MODEL_FILES, find_model
+from motion_transfer.extras import require_extra
 
 RED, GREEN, BLUE = (250, 0, 0), (0, 250, 0), (0, 0, 250)
 COLOURS = (RED, GREEN, BLUE)
@@ -147,3 +146,19 @@ def write_red_model(path: Path) -> Path:
     with warnings.catch_warnings(action="ignore"):
         torch.jit.script(RedModel()).save(str(path))
     return path
+
+
+def iuv_logits(parts: np.ndarray, uv: float = 0.5) -> IuvLogits:
+    """Logits that say these parts, with that U and V everywhere."""
+    logits = torch.full((1, PARTS, 128, 128), -8.0)
+    logits.scatter_(1, torch.from_numpy(parts).long()[None, None], 8.0)
+    return IuvLogits(logits, torch.full((1, PARTS - 1, 2, 128, 128), uv))
+
+
+def find_models() -> dict[str, Path]:
+    """BlazePose's model files by name; a test that asks is skipped where they were not fetched."""
+    try:
+        require_extra("estimate")
+        return {file.name: find_model(file) for file in MODEL_FILES}
+    except InputError as error:
+        pytest.skip(str(error))

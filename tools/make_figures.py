@@ -15,18 +15,18 @@ import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from motion_transfer.media.image import read_photo
-from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.drawing.canvas import colour_iuv, paste
+from motion_transfer.drawing.window import Window
+from motion_transfer.events import ignore
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.people import PeopleStream
-from motion_transfer.preview.driver_look import open_look
-from motion_transfer.preview.frame_plans import plan_frames
-from motion_transfer.preview.pictures import Pictures
-from motion_transfer.render.compose import colour_iuv, paste
-from motion_transfer.render.events import ignore
+from motion_transfer.preview.driver import PreviewedDriver, plan_frames
+from motion_transfer.preview.views import Views
+from motion_transfer.render.composition import open_recipe
+from motion_transfer.render.driver import open_driver
 from motion_transfer.render.options import RenderOptions
-from motion_transfer.render.recipe import Recipe
-from motion_transfer.render.source import prepare_source
-from motion_transfer.render.window import Window
+from motion_transfer.render.source import read_source
 
 ROOT = Path(__file__).parents[1]
 DEMO = ROOT / "motion_transfer" / "demo"
@@ -41,8 +41,8 @@ def main() -> None:
     options = RenderOptions(
         source=DEMO / "source.png", driver=DEMO / "driver.mkv", output=Path("unused.mp4")
     )
-    recipe = Recipe(options.renderer, options.weights_file)
-    source = prepare_source(options, recipe.texture_size)
+    recipe = open_recipe(options)
+    source = read_source(options, recipe.texture_size)
     feature_map = recipe.appearance_of(source)
     reader = open_reader(open_stream(options.driver))
     renderer = recipe.renderer(feature_map)
@@ -93,12 +93,12 @@ def photo_alone() -> np.ndarray:
     options = RenderOptions(
         source=DEMO / "astronaut.jpg", driver=DEMO / "wave.mkv", output=Path("unused.mp4")
     )
-    look = open_look(options, ROOT, ignore)
-    look.look_through(Event(), lambda _count: None)
-    plans, pictures = plan_frames(look, options), Pictures()
-    source = pictures.source(options)
-    panels = [source.photo.rgb, colour_iuv(source.iuv), pictures.texture(options)]
-    panels += [pictures.result(options, look, plans, moment) for moment in WAVING]
+    driver = PreviewedDriver(open_driver(options, ROOT, ignore))
+    driver.see_all(Event(), lambda _count: None)
+    plans, views = plan_frames(driver, options), Views()
+    source = views.source(options)
+    panels = [source.photo.rgb, colour_iuv(source.iuv), views.texture(options)]
+    panels += [views.result(options, driver, plans, moment) for moment in WAVING]
     return np.hstack(
         [cv2.resize(each, (PANEL_PX,) * 2, interpolation=cv2.INTER_AREA) for each in panels]
     )

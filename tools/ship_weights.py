@@ -18,8 +18,7 @@ import matplotlib.pyplot as plt
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from motion_transfer.training.config import TrainConfig
-from motion_transfer.training.config_file import build_config, read_settings, write_toml
+from motion_transfer.training.config import TrainConfig, build_config, read_settings, write_toml
 from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint, save_checkpoint
 
 ROOT = Path(__file__).parents[1]
@@ -61,7 +60,7 @@ def read_steps(weights: Path) -> int:
 
 
 def forget_folders(config: TrainConfig, init: str) -> TrainConfig:
-    """The settings without what means something on one machine only."""
+    """Take out of settings what means something on one machine only."""
     return replace(
         config,
         run=replace(config.run, init=init and f"{init}.safetensors"),
@@ -71,7 +70,7 @@ def forget_folders(config: TrainConfig, init: str) -> TrainConfig:
 
 
 def read_losses(run: Path) -> dict[int, Row]:
-    """The losses that a run logged, by step; where it was resumed, the later log counts."""
+    """Read the losses that a run logged, by step; where it was resumed, the later log counts."""
     found: dict[int, Row] = {}
     for log in sorted((run / "tensorboard").rglob("events.*"), key=lambda path: path.name):
         events = EventAccumulator(str(log), size_guidance={"scalars": 0}).Reload()
@@ -84,7 +83,7 @@ def read_losses(run: Path) -> dict[int, Row]:
 
 
 def find_marks(docs: Path, name: str, rows: list[Row]) -> list[int]:
-    """Steps at which another run begins, or images grow."""
+    """Find the steps at which another run begins, or images grow."""
     marks, last = [], {int(row["run"] or 0): int(row["step"] or 0) for row in rows}
     begin = 0
     for number, end in last.items():
@@ -129,6 +128,7 @@ def draw_curves(path: Path, rows: list[Row], marks: list[int]) -> None:
         panel.plot(steps, means, color="tab:blue")
         for mark in marks:
             panel.axvline(mark, color="0.5", linestyle=":")
+        # the first steps of a run would make the rest of the curve flat
         panel.set(title=term, xlabel="step", ylim=(0, 2.5 * sorted(values)[len(values) // 2]))
     figure.tight_layout()
     figure.savefig(path, dpi=90)

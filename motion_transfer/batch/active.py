@@ -1,41 +1,37 @@
-"""A job while it is worked on, and the things that several jobs share."""
+"""A job while it is worked on, and the results that it shares with others."""
 
 from __future__ import annotations
 
 import time
-from collections import Counter, deque
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal
 
 from motion_transfer.batch.expand import Job
-from motion_transfer.batch.signature import Files
+from motion_transfer.batch.state import Files
 from motion_transfer.batch.tasks import ChunkOutline, Fetch, Outline
 from motion_transfer.media.work import WorkFolder, key_of
-from motion_transfer.render.options import RenderOptions
+from motion_transfer.option import part_of
+from motion_transfer.render.options import RenderOptions, SourceOptions
 
 Stage = Literal["begun", "preparing", "rendering", "assembling", "ended"]
 
 
 def scan_name(options: RenderOptions) -> str:
-    """Jobs of one name share a look at their driver; a fitted one is also its source's."""
-    fitted = ()
-    if options.fit_body:
-        fitted = (options.source, options.source_iuv, options.source_iuv_order, options.person)
+    """Name what is seen of a driver; jobs of one name share it."""
+    # a driver that is fitted to a source belongs to that source as well
+    fitted = part_of(options, SourceOptions) if options.fit_body else None
     return _name(
         *("scan", options.driver, options.missing, options.iuv_order, options.frames),
         *(options.driver_kind, options.driver_person, options.estimator, options.estimator_model),
-        *fitted,
+        fitted,
     )
 
 
-def look_name(options: RenderOptions) -> str:
-    """Jobs of one name share a source's appearance: the feature map."""
-    return _name(
-        *("look", options.source, options.source_iuv, options.source_iuv_order, options.person),
-        *(options.garments, options.renderer, options.weights),
-        *(options.estimator, options.estimator_model),
-    )
+def source_name(options: RenderOptions) -> str:
+    """Name a source's appearance, the feature map; jobs of one name share it."""
+    return _name("source", part_of(options, SourceOptions), options.renderer, options.weights)
 
 
 @cache
@@ -45,15 +41,21 @@ def _name(kind: str, *words: object) -> str:
 
 @dataclass
 class Shared:
-    """A result that several jobs need: asked for once, kept until the last of them has ended."""
+    """A result that several jobs need: asked for once, kept until the last of them has ended.
 
-    users: int = 0
+    Attributes:
+        name: Tells it from others, see `scan_name` and `source_name`.
+        users: How many of those jobs have not ended.
+        blobs: The result, by kind, as `Workers.share` gave it.
+        files: What it was made from, see `sign_files`.
+    """
+
+    name: str
+    users: int
     state: Literal["missing", "pending", "ready", "failed"] = "missing"
     blobs: dict[str, Fetch] = field(default_factory=dict)
     files: Files = field(default_factory=dict)
-    notices: list[str] = field(default_factory=list)
     error: str = ""
-    tries: int = 0
 
 
 @dataclass
@@ -61,23 +63,22 @@ class ActiveJob:
     """A job between its beginning and its end.
 
     Attributes:
-        todo: chunks that nobody works on yet.
-        running: tasks of this job that have not come back.
-        tries: how often each chunk (by index), or another task (by kind), has failed.
-        ours: the existing output is what an earlier run of this job made.
+        todo: Chunks that nobody works on yet.
+        running: How many tasks of this job have not come back.
+        left: How many chunks are not finished.
+        tries: How often each chunk (by index), or another task (by kind), has failed.
+        ours: Whether the existing output is what an earlier run of this job made.
     """
 
     job: Job
     work: WorkFolder
     scan: Shared
-    look: Shared
-    scan_name: str
-    look_name: str
+    source: Shared
     ours: bool
     stage: Stage = "begun"
     prepared: Fetch | None = None
     outline: Outline | None = None
-    todo: deque[ChunkOutline] = field(default_factory=deque)
+    todo: list[ChunkOutline] = field(default_factory=list)
     running: int = 0
     left: int = 0
     tries: Counter[Any] = field(default_factory=Counter)

@@ -1,4 +1,4 @@
-"""What a batch says while it works."""
+"""What a batch says while it works; what is said of a job names it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class BatchStarted:
-    """Jobs were read."""
+    """Jobs were read, and the first of them begin."""
 
     job_count: int
     workers: int
@@ -77,14 +77,6 @@ class BatchFinished:
     feature_maps: int
 
 
-BatchEvent = (
-    BatchStarted
-    | JobPlanned
-    | JobFrames
-    | JobNotice
-    | JobDone
-    | JobFailed
-    | BatchStopping
-    | BatchFinished
-)
+JobEvent = JobPlanned | JobFrames | JobNotice | JobDone | JobFailed
+BatchEvent = BatchStarted | JobEvent | BatchStopping | BatchFinished
 BatchListener = Callable[[BatchEvent], None]

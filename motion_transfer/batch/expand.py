@@ -10,18 +10,26 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from motion_transfer.batch.manifest import PLACEHOLDERS, Manifest, plain
-from motion_transfer.batch.manifest_file import ManifestError, ManifestText, Place
+from motion_transfer.batch.manifest import (
+    PLACEHOLDERS,
+    Manifest,
+    ManifestError,
+    ManifestText,
+    Place,
+    plain,
+)
+from motion_transfer.batch.state import audio_files, driver_files
 from motion_transfer.errors import InputError
-from motion_transfer.people.motion_name import is_motion
-from motion_transfer.render.option import list_options
-from motion_transfer.render.options import NO_AUDIO, RenderOptions, parse_word
-from motion_transfer.weights.shipped import SHIPPED, find_weights
+from motion_transfer.media.iuv.formats import names_file
+from motion_transfer.option import list_options
+from motion_transfer.render.options import NO_AUDIO, RenderOptions
+from motion_transfer.weights import SHIPPED, find_weights
 
 OPTIONS = {entry.word: entry for entry in list_options(RenderOptions)}
 BELOW_ROOT = ("output", "sheet")
 GLOB_MARKS = "*?["
 ANY_OUTPUT = "OUTPUT"
+"""Stands for an output's name in a message that many jobs share."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +37,9 @@ class Job:
     """One run of a manifest.
 
     Attributes:
-        index: from 0, in the manifest's order.
-        name: for the report.
-        options: with absolute paths.
+        index: From 0, in the manifest's order.
+        name: What the report calls it.
+        options: Its paths are absolute.
     """
 
     index: int
@@ -42,7 +50,13 @@ class Job:
 
 @dataclass(frozen=True)
 class _Output:
-    """A file that a job writes: its path, what no other job may write, and its manifest's word."""
+    """A file that a job writes.
+
+    Attributes:
+        path: Where it is written.
+        real: The same without links: no other job may write there.
+        written: The manifest's words for it, its template filled in.
+    """
 
     path: str
     real: str
@@ -50,13 +64,13 @@ class _Output:
 
 
 def find_output_root(manifest: Manifest, path: Path) -> Path:
-    """The folder below which the outputs of the manifest at `path` lie; absolute."""
+    """Find the folder, absolute, below which the outputs of the manifest at `path` lie."""
     root = path.absolute().parent / manifest.output_root
     return root.resolve() if ".." in root.parts else root
 
 
 def expand(manifest: Manifest, text: ManifestText) -> list[Job]:
-    """Every job, in order.
+    """Lay out every job, in order.
 
     Raises: ManifestError for a glob without a match, a template that is none, two jobs with one
         output, an output outside the root, or options that do not go together.
@@ -83,7 +97,7 @@ def expand(manifest: Manifest, text: ManifestText) -> list[Job]:
 
 
 def _check_nesting(places: dict[str, Place], text: ManifestText) -> None:
-    """Raises: ManifestError for an output inside another one, which is a folder of frames."""
+    """Raise ManifestError for an output inside another one, which is a folder of frames."""
     folders = {output.rpartition("/")[0]: place for output, place in places.items()}
     for folder, place in folders.items():
         parts = folder.split("/")
@@ -97,6 +111,8 @@ def _check_nesting(places: dict[str, Place], text: ManifestText) -> None:
 
 
 class _Spread:
+    """Spreads one manifest; what many of its jobs share is found out once."""
+
     def __init__(self, manifest: Manifest, text: ManifestText) -> None:
         self._manifest = manifest
         self._text = text
@@ -107,7 +123,7 @@ class _Spread:
         self._defaults = self._written(manifest.defaults)
 
     def pairs(self) -> Iterator[tuple[Place, str, str, Any]]:
-        """Where it stands, source, driver, and the entry, for each job."""
+        """Yield where it stands, source, driver, and the entry, for each job."""
         for number, entry in enumerate(self._manifest.jobs):
             place: Place = ("jobs", number)
             for source in self._matches((*place, "source"), [entry.source], photos=True):
@@ -123,22 +139,17 @@ class _Spread:
     def options(
         self, place: Place, source: str, driver: str, entry: Any, number: int
     ) -> tuple[RenderOptions, list[_Output]]:
-        """The options of one job, and what it writes, the output first."""
+        """Make the options of one job, and list what it writes, the output first."""
         words = {**self._defaults, **self._written(entry), "source": source, "driver": driver}
-        names = {"source": _stem(source), "driver": _driver_name(driver), "index": number}
+        names = {"source": _stem(source), "driver": name_driver(driver), "index": number}
         outputs: list[_Output] = []
         for word in BELOW_ROOT:
             if words.get(word) is not None:
                 outputs.append(self._output((*place, word), words[word], names))
                 words[word] = outputs[-1].path
         try:
-            options = RenderOptions(
-                **{
-                    OPTIONS[word].name: _parsed(word, self._located(word, value))
-                    for word, value in words.items()
-                    if word in OPTIONS
-                }
-            )
+            given = {OPTIONS[word].name: self._value(word, value) for word, value in words.items()}
+            options = RenderOptions(**given)
             reason = _unwritable(options.output.suffix, options.codec, options.crf)
         except InputError as error:
             raise ManifestError(f"{self._text.where(place)}: {error}") from None
@@ -149,36 +160,36 @@ class _Spread:
 
     @staticmethod
     def _written(entry: BaseModel) -> dict[str, Any]:
-        """What was written, and is an option of a run."""
+        """List what was written, and is an option of a run."""
         return {
             word: plain(getattr(entry, word))
             for word in entry.model_fields_set
             if word in OPTIONS and getattr(entry, word) is not None
         }
 
-    def _located(self, word: str, value: Any) -> Any:
-        """Paths, from the manifest's folder."""
+    def _value(self, word: str, value: Any) -> Any:
+        """Read a value; paths are laid in the manifest's folder."""
         if word == "garments":
-            return [
+            value = [
                 {**g, **{k: str(self._folder / g[k]) for k in ("photo", "iuv") if g.get(k)}}
                 for g in value
             ]
-        fixed = word in BELOW_ROOT or (word, value) == ("audio", NO_AUDIO)
-        fixed = fixed or (word == "weights" and value in SHIPPED)
-        if OPTIONS[word].kind != "path" or fixed or is_motion(value):
-            return value
-        return value if value.startswith("/") else f"{self._folder}/{value}"
+        elif OPTIONS[word].kind == "path" and word not in BELOW_ROOT:
+            named = (word, value) == ("audio", NO_AUDIO) or (word == "weights" and value in SHIPPED)
+            fixed = named or value.startswith("/") or not _names_file(value)
+            return _path(value if fixed else f"{self._folder}/{value}")
+        return OPTIONS[word].read(value)
 
     def _matches(self, place: Place, patterns: Sequence[str], *, photos: bool) -> list[str]:
         found: list[str] = []
         for pattern in patterns:
-            if is_motion(pattern) or not any(mark in pattern for mark in GLOB_MARKS):
+            if not any(mark in pattern for mark in GLOB_MARKS) or not _names_file(pattern):
                 found.append(pattern)
                 continue
             base = Path(pattern).anchor
             start = Path(base) if base else self._folder
             matches = sorted(str(p) for p in start.glob(pattern.removeprefix(base)))
-            if photos:
+            if photos:  # the IUV of photos lie beside them
                 matches = [m for m in matches if not Path(m).stem.lower().endswith("_iuv")]
             if not matches:
                 raise ManifestError(f"{self._text.where(place)}: {pattern!r} matches nothing")
@@ -192,6 +203,7 @@ class _Spread:
             raise ManifestError(
                 f"{self._text.where(place)}: {template!r} is no template; known are {PLACEHOLDERS}"
             ) from None
+        # text, not paths, and one look at the disk a folder: ten thousand jobs are read in a second
         path = f"{self._root}/{written.rstrip('/')}"
         folder, _, name = path.rpartition("/")
         if folder not in self._real_folders:
@@ -210,28 +222,34 @@ class _Spread:
         return _Output(path, f"{real_folder}/{name}", written)
 
 
-def _parsed(word: str, value: Any) -> Any:
-    """A value as options hold it; paths that many jobs share are one object."""
-    if OPTIONS[word].kind == "path" and word not in BELOW_ROOT:
-        return _path(value)
-    return parse_word(OPTIONS[word], value)
+def name_driver(driver: str) -> str:
+    """Name a driver as part of a file name: `walk` of `walk.mkv` and `people:walk,frames=9`."""
+    return _stem(driver if _names_file(driver) else driver.partition(":")[2].partition(",")[0])
 
 
-@cache
-def _path(value: str) -> Path:
-    return Path(value)
+def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
+    """Say what is missing, once for each file; names are looked at, and nothing is opened."""
+    known: dict[Path, bool] = {}
+    for job in jobs:
+        options = job.options
+        paths = [("source", options.source)]
+        paths += [("driver", path) for path in driver_files(options)]
+        if options.weights is not None:
+            paths.append(("weights", find_weights(options.weights)))
+        if options.estimator_model is not None:
+            paths.append(("estimator model", options.estimator_model))
+        paths += [("garment", garment.photo) for garment in options.garments]
+        paths += [("audio", path) for path in audio_files(options)]
+        for what, path in paths:
+            if path not in known:
+                known[path] = path.exists()
+                if not known[path]:
+                    yield f"job {job.index} ({job.name}): {what} {path} does not exist"
 
 
-@cache
-def _unwritable(suffix: str, codec: str | None, crf: int | None) -> str:
-    """Why no `ANY_OUTPUT` of that ending and codec can be written; empty if it can."""
-    from motion_transfer.media.formats import choose_format  # loads the libraries of codecs
-
-    try:
-        choose_format(Path(f"{ANY_OUTPUT}{suffix}"), codec=codec, crf=crf)
-    except InputError as error:
-        return str(error)
-    return ""
+# ten thousand jobs share a few paths, and what follows from their names
+_path = cache(Path)
+_names_file = cache(names_file)
 
 
 @cache
@@ -240,28 +258,12 @@ def _stem(path: str) -> str:
 
 
 @cache
-def _driver_name(driver: str) -> str:
-    """A file name's worth of a driver: `walk` of `walk.mkv`, `walk/` and `people:walk,frames=9`."""
-    if is_motion(driver):
-        return Path(driver.partition(":")[2].partition(",")[0]).stem
-    return Path(driver).stem
+def _unwritable(suffix: str, codec: str | None, crf: int | None) -> str:
+    """Say why no `ANY_OUTPUT` of that ending and codec can be written; nothing if it can."""
+    from motion_transfer.media.output.formats import choose_format  # loads the libraries of codecs
 
-
-def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
-    """What is missing, in words, once for each file; looks at names, opens nothing."""
-    known: dict[Path, bool] = {}
-    for job in jobs:
-        options = job.options
-        paths = [("source", options.source), ("driver", options.driver)]
-        if options.weights is not None:
-            paths.append(("weights", find_weights(options.weights)))
-        if options.estimator_model is not None:
-            paths.append(("estimator model", options.estimator_model))
-        paths += [("garment", garment.photo) for garment in options.garments]
-        if options.audio is not None and str(options.audio) != NO_AUDIO:
-            paths.append(("audio", options.audio))
-        for what, path in paths:
-            if path not in known and not is_motion(path):
-                known[path] = path.exists()
-                if not known[path]:
-                    yield f"job {job.index} ({job.name}): {what} {path} does not exist"
+    try:
+        choose_format(Path(f"{ANY_OUTPUT}{suffix}"), codec=codec, crf=crf)
+    except InputError as error:
+        return str(error)
+    return ""

@@ -1,16 +1,35 @@
-"""What a manifest may say: models derived from the options of a run, and their JSON Schema."""
+"""Manifests: what they may say, and the place of whatever is wrong in one.
+
+The models follow from the options of a run, which are described once; so does the JSON Schema. A
+file is YAML, TOML or JSON; all three mean the same.
+"""
 
 from __future__ import annotations
 
+import difflib
+import json
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic_core import ErrorDetails
 
 from motion_transfer.errors import InputError
-from motion_transfer.render.option import Option, list_options
-from motion_transfer.render.options import RenderOptions, parse_word
+from motion_transfer.option import Option, list_options
+from motion_transfer.render.options import RenderOptions
 
-VERSION = 1
+SUFFIXES = (".yaml", ".yml", ".json", ".toml")
+MOST_ERRORS = 10  # a screenful: whoever mends those sees the next ones
+Place = tuple[int | str, ...]
+"""Where a field stands in a manifest, such as `("jobs", 0, "output")`."""
+
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's: five times as fast
+
+# a name such as `source: 7` is a number to YAML
 STRICT = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
 PRIORITY = (int, Field(0, description="Jobs with a higher one are rendered first."))
 NAME = (str | None, Field(None, description="What the report calls the job; else its output."))
@@ -43,16 +62,16 @@ def _type_of(entry: Option) -> Any:
 def _checked(entry: Option) -> Any:
     def check(value: Any) -> Any:
         try:
-            parse_word(entry, plain(value))
+            entry.read(plain(value))
         except InputError as error:
-            raise ValueError(str(error)) from None
+            raise ValueError(str(error)) from None  # of which pydantic makes a message
         return value
 
     return Annotated[_type_of(entry), AfterValidator(check)]
 
 
 def plain(value: Any) -> Any:
-    """A model's value as the mapping it came from."""
+    """Turn a field's value back into what was written: mappings, not models."""
     if isinstance(value, list):
         return [item.model_dump() if isinstance(item, BaseModel) else item for item in value]
     return value
@@ -122,9 +141,190 @@ class Manifest(BaseModel):
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema of manifests, as published in `jobs/manifest.schema.json`."""
+    """Make the JSON Schema of manifests, as published in `jobs/manifest.schema.json`."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "motion-transfer manifest",
         **Manifest.model_json_schema(),
     }
+
+
+SETTABLE = [f for f in Manifest.model_fields if f not in ("version", "defaults", "jobs", "matrix")]
+"""The manifest's own fields that `--set` may name; any other name is an option of its jobs."""
+
+
+class ManifestError(InputError):
+    """A manifest that cannot be used; the message has one line for each thing wrong."""
+
+
+def read_manifest(path: Path, settings: Sequence[str] = ()) -> tuple[Manifest, ManifestText]:
+    """Read and check a manifest.
+
+    Args:
+        settings: `key=value`, over a field of the manifest or an option of every job.
+    Raises: ManifestError naming file, line where possible, field, value and what is allowed.
+    """
+    text = ManifestText(path)
+    data = text.data()
+    if not isinstance(data, dict):
+        raise ManifestError(f"{path}: a manifest is a mapping with version and jobs")
+    given = {_set(data, setting): setting for setting in settings}
+    try:
+        return Manifest.model_validate(data), text
+    except ValidationError as error:
+        raise text.error(error.errors(), given) from None
+
+
+class ManifestText:
+    """A manifest's text, which can say where a field stands."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file. Raises: ManifestError if it cannot be, or has an unknown ending."""
+        self.path = path
+        self._suffix = path.suffix.lower()
+        if self._suffix not in SUFFIXES:
+            raise ManifestError(f"{path}: unknown ending; supported are {', '.join(SUFFIXES)}")
+        try:
+            self._text = path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            raise ManifestError(f"manifest {path} does not exist") from None
+        except (OSError, UnicodeDecodeError) as error:
+            raise ManifestError(f"manifest {path} cannot be read: {error}") from None
+
+    def data(self) -> Any:
+        """Parse the content. Raises: ManifestError where the syntax is broken."""
+        try:
+            if self._suffix == ".toml":
+                return tomllib.loads(self._text)
+            if self._suffix == ".json":
+                return json.loads(self._text)
+            return yaml.load(self._text, Loader=_Loader)
+        except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
+            raise ManifestError(f"{self.path}: {error}") from None
+        except yaml.YAMLError as error:
+            mark = getattr(error, "problem_mark", None)
+            line = f":{mark.line + 1}" if mark else ""
+            reason = getattr(error, "problem", None) or str(error)
+            raise ManifestError(f"{self.path}{line}: {reason}") from None
+
+    def line(self, place: Place) -> int | None:
+        """Find the line, from 1, on which a field stands, or the nearest thing around it."""
+        if self._suffix == ".toml":
+            return self._toml_line(place)
+        # nodes know their lines, and JSON is YAML to this parser
+        node = yaml.compose(self._text, Loader=_Loader)
+        line: int | None = None
+        for step in place:
+            if isinstance(node, yaml.MappingNode):
+                pair = next(((k, v) for k, v in node.value if k.value == step), None)
+                if pair is None:
+                    break
+                line, node = pair[0].start_mark.line, pair[1]
+            elif isinstance(node, yaml.SequenceNode) and isinstance(step, int):
+                if step >= len(node.value):
+                    break
+                node = node.value[step]
+                line = node.start_mark.line
+            else:
+                break
+        return None if line is None else line + 1
+
+    def where(self, place: Place) -> str:
+        """Name file, line where possible, and field, for messages."""
+        line = self.line(place)
+        words = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in place).lstrip(".")
+        return f"{self.path}{f':{line}' if line else ''}: {words}"
+
+    def error(self, details: Sequence[ErrorDetails], given: Mapping[str, str]) -> ManifestError:
+        """Say everything that is wrong, a line each.
+
+        Args:
+            given: The `key=value` settings by key: what is wrong there stands in no file.
+        """
+        lines: dict[str, None] = {}  # an ordered set: one wrong default is wrong in every job
+        for number, detail in enumerate(details):
+            if len(lines) == MOST_ERRORS:
+                lines[f"and {len(details) - number} more"] = None
+                break
+            setting = next((given[s] for s in map(str, detail["loc"]) if s in given), None)
+            if setting is None:
+                lines[self._sentence(detail)] = None
+            else:
+                lines[f"--set {setting}: {_reason(detail)}"] = None
+        return ManifestError("\n".join(lines))
+
+    def _sentence(self, detail: ErrorDetails) -> str:
+        place = detail["loc"]
+        value, kind = detail["input"], detail["type"]
+        if kind == "extra_forbidden":
+            return f"{self.where(place)}: {_unknown(str(list(place)[-1]), _known_fields(place))}"
+        if kind == "missing":
+            return f"{self.where(place)}: is missing"
+        return f"{self.where(place)}: {value!r}: {_reason(detail)}"
+
+    def _toml_line(self, place: Place) -> int | None:
+        # Python's parser of TOML keeps no lines: headers are counted, then the key is looked for
+        lines = self._text.splitlines()
+        start = 0
+        if len(place) > 1:
+            header = re.compile(rf"\s*\[+\s*{re.escape(str(place[0]))}\s*\]+")
+            headers = [number for number, line in enumerate(lines) if header.match(line)]
+            index = place[1] if isinstance(place[1], int) else 0
+            if index >= len(headers):
+                return None
+            start = headers[index]
+        key = re.compile(rf"\s*{re.escape(str(list(place)[-1]))}\s*=")
+        for number in range(start, len(lines)):
+            if key.match(lines[number]):
+                return number + 1
+            if number > start and lines[number].startswith("["):
+                break
+        return start + 1 if start else None
+
+
+def _known_fields(place: Place) -> list[str]:
+    """List the fields of the model in which a field stands."""
+    model: Any = Manifest
+    for step in list(place)[:-1]:
+        if isinstance(step, str) and step in model.model_fields:
+            model = model.model_fields[step].annotation
+            while inner := getattr(model, "__args__", None):  # such as list[Job]
+                model = inner[0]
+    return list(getattr(model, "model_fields", Manifest.model_fields))
+
+
+def _unknown(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    return f"unknown field; {hint}allowed are {', '.join(known)}"
+
+
+def _reason(detail: ErrorDetails) -> str:
+    return detail["msg"].removeprefix("Value error, ")  # pydantic's, before a message of ours
+
+
+def _set(data: dict[str, Any], setting: str) -> str:
+    """Apply `key=value` to the manifest if it has such a field, else to all jobs; give the key.
+
+    Raises: ManifestError for a key that is neither.
+    """
+    key, equals, value = setting.partition("=")
+    if not equals:
+        raise ManifestError(f"--set {setting!r}; write key=value")
+    try:
+        parsed = yaml.load(value, Loader=_Loader)
+    except yaml.YAMLError:
+        parsed = value
+    if parsed is None and value.strip() not in ("", "~", "null"):
+        parsed = value  # such as #102030, which YAML takes for a comment
+    if key in SETTABLE:
+        data[key] = parsed
+        return key
+    if key not in Defaults.model_fields:
+        known = [*SETTABLE, *Defaults.model_fields]
+        raise ManifestError(f"--set {setting}: {_unknown(key, known)}")
+    data["defaults"] = {**(data.get("defaults") or {}), key: parsed}
+    for entry in [*(data.get("jobs") or []), *(data.get("matrix") or [])]:
+        if isinstance(entry, dict) and key in entry:
+            entry[key] = parsed
+    return key

@@ -15,9 +15,9 @@ from typing import Any
 
 from motion_transfer.batch.tasks import Fetch
 from motion_transfer.errors import InputError
+from motion_transfer.extras import require_extra
 
-CLUSTER_EXTRA = "motion-transfer[cluster]"
-# set before ray is imported: it reads them then
+# read when ray is imported: an actor without a GPU of its own keeps CUDA_VISIBLE_DEVICES as it is
 os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
 
 
@@ -28,25 +28,22 @@ class RayWorkers:
         """Join a cluster, or start one on this machine if `address` is None.
 
         Args:
-            count: of actors; None: one for each GPU of the cluster, or for each core.
+            count: How many actors; None: one for each GPU of the cluster, or for each core.
         Raises: InputError if Ray is not installed or there is no such cluster.
         """
-        try:
-            import ray
-            from ray.exceptions import ObjectLostError, RayActorError, WorkerCrashedError
-        except ImportError:
-            raise InputError(
-                f"the ray engine is not installed; pip install '{CLUSTER_EXTRA}'"
-            ) from None
+        require_extra("cluster")
+        import ray
+        from ray.exceptions import ObjectLostError, RayActorError, WorkerCrashedError
+
         self._ray = ray
         self._joined_here = not ray.is_initialized()
         if self._joined_here:
             try:
+                # actors find the modules that are found here
+                path = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
                 ray.init(
                     address=address,
-                    runtime_env={
-                        "env_vars": {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-                    },
+                    runtime_env={"env_vars": path},
                     configure_logging=False,
                     log_to_driver=False,
                 )
@@ -54,11 +51,8 @@ class RayWorkers:
                 raise InputError(
                     f"no Ray cluster at {address}: {error}; start one with `ray start --head`"
                 ) from error
-        self.lost_error: tuple[type[BaseException], ...] = (
-            RayActorError,
-            WorkerCrashedError,
-            ObjectLostError,
-        )
+        lost: list[type[BaseException]] = [RayActorError, WorkerCrashedError, ObjectLostError]
+        self.lost_error = tuple(lost)
         resources = ray.cluster_resources()
         self._gpus = int(resources.get("GPU", 0))
         self.count = count or self._gpus or max(1, int(resources.get("CPU", 1)))
@@ -67,7 +61,9 @@ class RayWorkers:
 
     def submit(self, place: int, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
         if self._actors[place] is None:
-            self._actors[place] = self._start(place)
+            needs = {"num_gpus": 1} if self._gpus else {"num_cpus": 1}
+            worker = self._ray.remote(Worker).options(**needs, max_restarts=0)
+            self._actors[place] = worker.remote()
         future: Future[Any] = Future()
         inner = self._actors[place].call.remote(task, *arguments).future()
         inner.add_done_callback(partial(self._deliver, place, future))
@@ -87,13 +83,8 @@ class RayWorkers:
         if self._joined_here:
             self._ray.shutdown()
 
-    def _start(self, place: int) -> Any:
-        worker = self._ray.remote(Worker)
-        options = {"num_gpus": 1} if self._gpus else {"num_cpus": 1}
-        return worker.options(**options, max_restarts=0).remote(place)
-
     def _deliver(self, place: int, future: Future[Any], inner: Future[Any]) -> None:
-        """Pass a result on; an error of ours as it was raised, not as Ray wraps it."""
+        """Pass a result on; a task's error goes as it was raised, not as Ray wraps it."""
         error = inner.exception()
         if error is None:
             future.set_result(inner.result())
@@ -105,14 +96,13 @@ class RayWorkers:
 
 
 class Worker:
-    """What runs in an actor."""
+    """Runs tasks in an actor."""
 
-    def __init__(self, place: int) -> None:
+    def __init__(self) -> None:
+        os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as every command has it
         import cv2
         import torch
 
-        os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-        self.place = place
         if not torch.cuda.is_available():
             torch.set_num_threads(1)
         cv2.setNumThreads(1)
@@ -123,7 +113,7 @@ class Worker:
 
 
 def _fetch(references: list[Any]) -> bytes:
-    """A blob from the object store; the list keeps Ray from fetching it before it is wanted."""
+    """Fetch a blob; in a list, since Ray would fetch a bare argument before it is wanted."""
     import ray
 
     return ray.get(references[0])

@@ -1,9 +1,14 @@
-"""What became of every job: a page to look at, and the same as JSON."""
+"""What became of every job: a page to look at, the same as JSON, and small pictures.
+
+The pictures are made by workers, which have loaded what reads a video; the scheduler, which writes
+the page, need not.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -11,24 +16,61 @@ from typing import Any
 
 from motion_transfer.batch.expand import Job
 from motion_transfer.batch.state import BatchState
+from motion_transfer.errors import InputError
 from motion_transfer.media.publish import explain_disk_errors
 from motion_transfer.version import __version__
 
 REPORT_FORMAT = "batch-report-1"
 PICTURES = ("source", "result")
 PUBLIC = ("seconds", "frames", "duration_seconds", "renderer", "note", "error")
+"""What of a job's record the report tells."""
+
+POSTER_PX = 160
+"""The longer side of a picture; the page shows them at up to 120 px of height."""
+
+
+def write_posters(source: Path, output: Path, stem: Path) -> bool:
+    """Write small pictures of a source and of the middle of an output.
+
+    Args:
+        stem: The beginning of their names, which end in `-source.png` and `-result.png`.
+    Returns: Whether both could be had; no job fails for want of them.
+    """
+    import cv2
+
+    from motion_transfer.media.pictures.photo import read_photo, write_png
+    from motion_transfer.media.pictures.video import IndexedVideo
+
+    try:
+        stem.parent.mkdir(parents=True, exist_ok=True)
+        if output.is_dir():
+            frames = sorted(output.iterdir())
+            middle = read_photo(frames[len(frames) // 2]).rgb
+        elif output.suffix in (".png", ".gif"):
+            middle = read_photo(output).rgb
+        else:
+            video = IndexedVideo(output)
+            middle = video.read(video.frame_count // 2)
+        for name, rgb in zip(PICTURES, (read_photo(source).rgb, middle), strict=True):
+            scale = min(1, POSTER_PX / max(rgb.shape[:2]))
+            size = (max(1, round(rgb.shape[1] * scale)), max(1, round(rgb.shape[0] * scale)))
+            small = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
+            write_png(stem.with_name(f"{stem.name}-{name}.png"), small)
+    except (InputError, OSError):
+        return False
+    return True
 
 
 def write_report(jobs: Sequence[Job], state: BatchState) -> Path:
-    """Write `index.html` and `report.json`; the pictures are there. Raises: OutputError."""
+    """Write `index.html`, whose path is returned, and `report.json`. Raises: OutputError."""
     folder = state.report
     with explain_disk_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         entries = [_entry(job, state) for job in jobs]
-        counts = {word: sum(e["status"] == word for e in entries) for word in _statuses(entries)}
-        facts = {"format": REPORT_FORMAT, "version": __version__, "counts": counts}
-        _write(folder / "report.json", json.dumps({**facts, "jobs": entries}, indent=1))
-        _write(folder / "index.html", _page({**facts, "jobs": entries}))
+        counts = dict(sorted(Counter(entry["status"] for entry in entries).items()))
+        facts = {"format": REPORT_FORMAT, "version": __version__, "counts": counts, "jobs": entries}
+        _write(folder / "report.json", json.dumps(facts, indent=1))
+        _write(folder / "index.html", _page(facts))
     return folder / "index.html"
 
 
@@ -46,12 +88,8 @@ def _entry(job: Job, state: BatchState) -> dict[str, Any]:
         "source": str(job.options.source),
         "driver": str(job.options.driver),
         **{f"{k}_picture": f"{stem}-{k}.png" if has_pictures else None for k in PICTURES},
-        **({key: record[key] for key in PUBLIC if record.get(key) is not None} if record else {}),
+        **{key: record[key] for key in PUBLIC if record.get(key) is not None},
     }
-
-
-def _statuses(entries: Sequence[dict[str, Any]]) -> list[str]:
-    return sorted({entry["status"] for entry in entries})
 
 
 def _page(facts: dict[str, Any]) -> str:
@@ -64,4 +102,4 @@ def _page(facts: dict[str, Any]) -> str:
 def _write(path: Path, text: str) -> None:
     part = path.with_name(f".{path.name}.part")
     part.write_text(text, encoding="utf-8")
-    part.replace(path)
+    part.replace(path)  # whoever looks meanwhile sees a whole page

@@ -1,4 +1,4 @@
-"""A whole batch, from a manifest to a report: what `mt batch` calls."""
+"""A whole batch, from a manifest to its report: what `mt batch` calls."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from pathlib import Path
 
 from motion_transfer.batch.events import BatchFinished, BatchListener, BatchStarted
 from motion_transfer.batch.expand import Job, check_inputs, expand, find_output_root
-from motion_transfer.batch.manifest import Manifest
-from motion_transfer.batch.manifest_file import ManifestError, read_manifest
+from motion_transfer.batch.manifest import Manifest, ManifestError, read_manifest
 from motion_transfer.batch.report import write_report
 from motion_transfer.batch.schedule import Scheduler, Tally
 from motion_transfer.batch.signals import Signals
@@ -21,7 +20,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.publish import explain_disk_errors
 
 ENGINES = ("local", "ray")
-MOST_PROBLEMS = 10
+MOST_PROBLEMS = 10  # missing inputs that are named; a wrong folder misses them all
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,12 +29,12 @@ class BatchOptions:
 
     Attributes:
         settings: `key=value`, over the manifest's fields or every job's options.
-        chosen: half-open range of jobs, either end open.
-        workers: processes; None: one for each GPU, or for each core.
+        chosen: A half-open range of jobs, either end open.
+        workers: How many processes; None: one for each GPU, or for each core.
         engine: `local`, or `ray` with the `cluster` extra.
-        address: of the Ray cluster; `auto` finds one, None starts one on this machine.
-        keep_going: a failed job does not stop the others.
-        restart: forget what earlier runs finished.
+        address: Where the Ray cluster is; `auto` finds one, None starts one on this machine.
+        keep_going: Whether the others go on after a failed job.
+        restart: Whether to forget what earlier runs finished.
     """
 
     manifest: Path
@@ -73,8 +72,8 @@ def read_batch(path: Path, settings: Sequence[str] = ()) -> Batch:
     return Batch(manifest, expand(manifest, text), BatchState(path, root), path)
 
 
-def validate(batch: Batch) -> None:
-    """Raises: ManifestError naming the inputs that are missing."""
+def check_batch(batch: Batch) -> None:
+    """Check that all inputs are there. Raises: ManifestError naming those that are missing."""
     problems = list(check_inputs(batch.jobs))
     if problems:
         more = [f"and {len(problems) - MOST_PROBLEMS} more"] * (len(problems) > MOST_PROBLEMS)
@@ -108,21 +107,17 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
         listener(BatchStarted(len(jobs), workers.count))
         with signals.noted():
             tally = scheduler.run()
-        listener(
-            BatchFinished(
-                *(tally.done, tally.current, tally.failed, tally.left),
-                time.monotonic() - began,
-                scheduler.feature_maps,
-            )
-        )
-        write_report(batch.jobs, batch.state)
+        counts = (tally.done, tally.current, tally.failed, tally.left)
+        seconds = time.monotonic() - began
+        listener(BatchFinished(*counts, seconds, scheduler.feature_maps))
+        write_report(batch.jobs, batch.state)  # of all jobs, and after a Ctrl-C as well
     if signals.interrupted:
         raise KeyboardInterrupt
     return tally
 
 
-def status(batch: Batch) -> dict[str, int]:
-    """How many jobs are done, failed and not begun, as far as was noted."""
+def count_jobs(batch: Batch) -> dict[str, int]:
+    """Count the jobs that are done, failed and to do, as far as was noted."""
     counts = {"done": 0, "failed": 0, TO_DO: 0}
     for job in batch.jobs:
         counts[batch.state.status_of(job.options.output)] += 1
@@ -130,7 +125,7 @@ def status(batch: Batch) -> dict[str, int]:
 
 
 def choose_jobs(jobs: list[Job], options: BatchOptions) -> list[Job]:
-    """The jobs that the options name. Raises: InputError if there are none."""
+    """Take the jobs that the options name. Raises: InputError if there are none."""
     start, stop = options.chosen
     chosen = jobs[slice(start, stop)]
     if not chosen:
@@ -150,6 +145,7 @@ def _open_workers(options: BatchOptions, scratch: Path) -> Workers:
 
 
 def _default_count() -> int:
-    """One worker a GPU, as the driver lists them; else one a core."""
+    """Count a worker for each GPU, or else for each core."""
+    # as NVIDIA's driver lists them: to ask torch would load it here
     gpus = len(list(Path("/proc/driver/nvidia/gpus").glob("*")))
     return gpus or len(os.sched_getaffinity(0))

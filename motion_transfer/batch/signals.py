@@ -18,7 +18,7 @@ class Signals:
     would never be given back, and a thread that needs it would wait without end.
 
     Attributes:
-        interrupted: whether a Ctrl-C was heard.
+        interrupted: Whether a Ctrl-C was heard.
     """
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class Signals:
 
     @contextmanager
     def noted(self) -> Iterator[None]:
-        """Inside, they are noted; only the main thread of a process hears any."""
+        """Note signals while the block runs; in any other thread than the main one, do nothing."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -48,8 +48,8 @@ class Signals:
         """Act on what was noted.
 
         Args:
-            halt: what a Ctrl-C asks for at first; False where that has happened already, so that
-                it means to stop now.
+            halt: Does what a Ctrl-C asks for at first; gives False where that has happened already,
+                so that it means to stop now.
         Raises: KeyboardInterrupt, or what SIGTERM's own handler raises.
         """
         while self._heard:

@@ -1,29 +1,148 @@
-"""What a batch remembers between runs: its folder, its lock, and a journal of jobs."""
+"""What a batch remembers between runs: its folder, its lock, a journal of jobs, and their files.
+
+Whether the files that an output was made from are still the same is told without decoding them, as
+a version control system's index does: size and times that did not change mean content that did not
+change; where they did, the content itself decides.
+"""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from motion_transfer.errors import OutputError
-from motion_transfer.media.journal import Journal
+from motion_transfer.errors import InputError, OutputError
+from motion_transfer.media.iuv.formats import find_iuv_of, names_file
 from motion_transfer.media.publish import explain_disk_errors
-from motion_transfer.media.work import WorkFolder, key_of, locked, work_path
+from motion_transfer.media.work import Journal, WorkFolder, digest_of, key_of, locked, work_path
+from motion_transfer.option import list_options
+from motion_transfer.render.options import NO_AUDIO, DriverOptions, OutputOptions, RenderOptions
+from motion_transfer.version import __version__
+
+NOT_DRAWN = ("workers", "restart", "force")
+"""Options that decide nothing of an output."""
 
 TO_DO = "to do"
 Record = dict[str, Any]
+"""What became of a job, as a line of the journal."""
+
+Signature = dict[str, Any]
+Files = dict[str, list[str]]
+"""By path: a key of its status, and the digest of its content."""
+
+
+def source_files(options: RenderOptions) -> Iterator[Path]:
+    """List what a source's appearance is made from. Raises: InputError if a photo is missing."""
+    photos = [(options.source, options.source_iuv)]
+    photos += [(garment.photo, garment.iuv) for garment in options.garments]
+    for photo, given in photos:
+        yield photo
+        if iuv := given or find_iuv_of(photo):
+            yield iuv
+    yield from options.weights_files
+    if options.estimator_model is not None:
+        yield options.estimator_model
+
+
+def driver_files(options: DriverOptions) -> Iterator[Path]:
+    """List the driver, unless it is a motion."""
+    if names_file(options.driver):
+        yield options.driver
+
+
+def audio_files(options: OutputOptions) -> Iterator[Path]:
+    """List the sound, if a file is named."""
+    if options.audio is not None and str(options.audio) != NO_AUDIO:
+        yield options.audio
+
+
+def sign_files(paths: Iterable[Path]) -> Files:
+    """Note status and digest of files and folders; to be called before they are read.
+
+    Raises: InputError naming one that does not exist.
+    """
+    try:
+        return {str(path): [file_status(path), digest_of(path)] for path in paths}
+    except FileNotFoundError as error:
+        raise InputError(f"{error.filename} does not exist") from None
+
+
+def check_unchanged(files: Files) -> None:
+    """Raise InputError if a file is not what it was when it was signed."""
+    for name, (status, digest) in files.items():
+        path = Path(name)
+        try:
+            # a file that was only touched is read again, and found the same
+            unchanged = status == file_status(path) or digest == digest_of(path)
+        except FileNotFoundError:
+            raise InputError(f"{path} does not exist") from None
+        if not unchanged:
+            raise InputError(f"{path} has changed since the batch began; start it again")
+
+
+def sign(options: RenderOptions, files: Files) -> Signature:
+    """Note what tells a published output from another. Raises: OSError."""
+    return {"options": _options_key(options), "files": files, "output": file_status(options.output)}
+
+
+def is_current(
+    options: RenderOptions, signature: Signature, status_of: Callable[[Path], str]
+) -> bool:
+    """Tell whether the output is there, untouched, and made from these options and this content.
+
+    Args:
+        status_of: `file_status`, which may remember the inputs that jobs share.
+    """
+    try:
+        if signature["options"] != _options_key(options):
+            return False
+        if signature["output"] != file_status(options.output):
+            return False
+        parts = (driver_files(options), source_files(options), audio_files(options))
+        paths = {str(path): path for part in parts for path in part}
+        return paths.keys() == signature["files"].keys() and all(
+            signature["files"][name][0] == status_of(path)
+            or signature["files"][name][1] == digest_of(path)
+            for name, path in paths.items()
+        )
+    except (OSError, InputError, KeyError):
+        return False
+
+
+def is_ours(options: RenderOptions, signature: Signature) -> bool:
+    """Tell whether the output is the one that the signature's job made, from whatever."""
+    try:
+        return signature.get("output") == file_status(options.output)
+    except OSError:
+        return False
+
+
+def _options_key(options: RenderOptions) -> str:
+    names = [e.name for e in list_options(RenderOptions) if e.name not in NOT_DRAWN]
+    return key_of({"version": __version__, **{name: getattr(options, name) for name in names}})
+
+
+def file_status(path: Path) -> str:
+    """Make a key of size, time and inode of a file, or of a folder's files. Raises: OSError."""
+    files = sorted(f for f in path.iterdir() if f.is_file()) if path.is_dir() else [path]
+    return key_of({f.name: [(s := f.stat()).st_size, s.st_mtime_ns, s.st_ino] for f in files})
 
 
 class BatchState:
-    """Records of jobs by their output; the last one counts."""
+    """What is kept of a manifest's runs, hidden in its output root.
+
+    Attributes:
+        report: The folder of the report, which is for people to look at.
+        scratch: Where local workers hand each other results.
+        estimates: Where the IUV of drivers is kept that are raw pictures.
+        records: Those of jobs by their output; the last one of each counts.
+    """
 
     def __init__(self, manifest: Path, output_root: Path) -> None:
         self.folder = output_root / f".{manifest.stem}.batch"
         self.report = output_root / f"{manifest.stem}.report"
-        self.pictures = self.report / "pictures"
         self.scratch = self.folder / "scratch"
         self.estimates = (self.folder / "estimates").absolute()
         self._manifest = manifest
@@ -46,13 +165,13 @@ class BatchState:
             self._journal.append(entry)
 
     def status_of(self, output: Path) -> str:
-        """`done`, `failed` or `to do`, as far as was noted and the output is still there."""
+        """Say `done`, `failed` or `to do`, as far as was noted and the output is still there."""
         word = self.records.get(str(output), {}).get("status", TO_DO)
         return TO_DO if word == "done" and not output.exists() else word
 
     def picture_stem(self, output: Path) -> Path:
-        """Where the pictures of a job lie; jobs are known by their outputs, in whatever order."""
-        return self.pictures / key_of({"output": output})[:16]
+        """Say where a job's pictures lie; jobs are known by their outputs, in whatever order."""
+        return self.report / "pictures" / key_of({"output": output})[:16]
 
     def forget(self) -> None:
         """Remember nothing; for `--restart`, inside `held`."""
@@ -60,11 +179,11 @@ class BatchState:
         self.records = {}
 
     def clean(self, outputs: list[Path]) -> int:
-        """Remove this folder and what is left of interrupted jobs; how many folders went.
+        """Remove this folder and what is left of interrupted jobs; count the folders that went.
 
         Outputs stay, and so does the report. Raises: OutputError while somebody is at work.
         """
-        is_there = self.folder.exists()
+        is_there = self.folder.exists()  # or the lock would make it
         with self.held() if is_there else nullcontext():
             left = [output for output in outputs if work_path(output).exists()]
             for output in left:

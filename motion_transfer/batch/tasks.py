@@ -9,11 +9,11 @@ from __future__ import annotations
 import pickle
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motion_transfer.batch.signature import (
+from motion_transfer.batch.state import (
     Files,
     audio_files,
     check_unchanged,
@@ -26,21 +26,28 @@ from motion_transfer.render.options import RenderOptions
 if TYPE_CHECKING:  # the scheduler imports this module, and has no need of the libraries below
     import numpy as np
 
-    from motion_transfer.media.iuv_stream import IuvReader
+    from motion_transfer.drawing.renderers.interface import Renderer
+    from motion_transfer.media.iuv.stream import IuvReader
+    from motion_transfer.render.composition import DriverFile, Prepared
     from motion_transfer.render.plan import Chunk
-    from motion_transfer.render.prepare import DriverFile, Prepared
-    from motion_transfer.render.renderer import Renderer
 
-KEPT_OBJECTS = 16
+KEPT_OBJECTS = 16  # of a few jobs at once: run, renderer and reader of each
 KEPT_FRAMES_BYTES = 256 << 20
 """A worker keeps the decoded frames of its last chunk, for the next source with that driver."""
 
+PICKLE_PROTOCOL = 5  # large arrays are not copied on their way
 Fetch = Callable[[], bytes]
+"""Gives a blob, wherever it lies; what `Workers.share` returns."""
 
 
 @dataclass(frozen=True)
 class ChunkOutline:
-    """What the scheduler knows of a chunk: its frames, the name of its segment, its content."""
+    """What the scheduler knows of a chunk.
+
+    Attributes:
+        piece: The name of its segment in the work folder.
+        key: That of the content it is made from.
+    """
 
     index: int
     start: int
@@ -53,7 +60,10 @@ class ChunkOutline:
 class Outline:
     """What the scheduler knows of a prepared run.
 
-    `note` says in which frames nobody was found; empty if there are none.
+    Attributes:
+        chunks_at_once: How many chunks one task renders.
+        output_key: That of the whole output.
+        note: Says in which frames nobody was found; empty if there are none.
     """
 
     chunks: tuple[ChunkOutline, ...]
@@ -73,7 +83,7 @@ class Warm:
         self.frames: tuple[Any, list[np.ndarray]] = (None, [])
 
     def get(self, name: str, make: Callable[[], Any]) -> Any:
-        """The object of a name, made if it is not there."""
+        """Give the object of a name; make it if it is not there."""
         if name not in self._objects:
             self._objects[name] = make()
             while len(self._objects) > KEPT_OBJECTS:
@@ -83,18 +93,19 @@ class Warm:
 
 
 WARM = Warm()
-"""Of this worker process."""
+"""Kept by this worker process."""
 
 
 def scan(options: RenderOptions, folder: Path) -> tuple[bytes, Files, list[str]]:
-    """A driver's scan, its files, and what is worth saying.
+    """Look through a driver.
 
     Args:
-        folder: where the IUV of drivers is kept that are raw pictures.
+        folder: Where the IUV of drivers is kept that are raw pictures.
+    Returns: The scan, the driver's files, and what is worth saying.
     Raises: InputError, IuvFileError.
     """
-    from motion_transfer.render.events import Event, Notice
-    from motion_transfer.render.prepare import scan_driver
+    from motion_transfer.events import Event, Notice
+    from motion_transfer.render.driver import scan_driver
 
     notices: list[str] = []
 
@@ -103,48 +114,44 @@ def scan(options: RenderOptions, folder: Path) -> tuple[bytes, Files, list[str]]
             notices.append(event.message)
 
     files = sign_files(driver_files(options))
-    scanned = scan_driver(replace(options, workers=1), folder, listen)
-    return pickle.dumps(scanned, 5), files, notices
+    scanned = scan_driver(options, folder, listen, workers=1)
+    return pickle.dumps(scanned, PICKLE_PROTOCOL), files, notices
 
 
-def look(options: RenderOptions) -> tuple[bytes, bytes, Files]:
-    """A source, its appearance (the feature map), its files. Raises: InputError, WeightsError."""
-    from motion_transfer.render.content import digest_weights
-    from motion_transfer.render.recipe import Recipe
-    from motion_transfer.render.source import prepare_source
+def encode(options: RenderOptions) -> tuple[bytes, bytes, Files]:
+    """Read a source and compute its appearance, the feature map.
 
-    files = sign_files(source_files(options))
-    recipe = Recipe(options.renderer, options.weights_file, digest_weights(options))
-    source = prepare_source(options, recipe.texture_size)
-    return pickle.dumps(source, 5), pickle.dumps(recipe.appearance_of(source), 5), files
+    Returns: The source, its appearance, its files.
+    Raises: InputError, WeightsError.
+    """
+    from motion_transfer.render.composition import open_recipe
+    from motion_transfer.render.source import read_source
+
+    files = sign_files(source_files(options))  # before: what changes while it is read is noticed
+    recipe = open_recipe(options)
+    source = read_source(options, recipe.texture_size)
+    appearance = recipe.appearance_of(source)
+    return pickle.dumps(source, PICKLE_PROTOCOL), pickle.dumps(appearance, PICKLE_PROTOCOL), files
 
 
 def prepare(
     options: RenderOptions, scanned: Fetch, source: Fetch, source_files: Files
 ) -> tuple[bytes, Outline]:
-    """A run, planned.
+    """Plan a run and put its parts together.
 
     Raises: InputError and its kinds, also if a source is no longer what its appearance was made
         from: chunks are keyed by what its files hold now.
     """
-    from motion_transfer.media.formats import choose_format
+    from motion_transfer.events import ignore
+    from motion_transfer.render.composition import open_recipe, plan_run, prepare_run
     from motion_transfer.render.engine import CHUNKS_AT_ONCE
-    from motion_transfer.render.events import ignore
-    from motion_transfer.render.missing import describe_missing
-    from motion_transfer.render.prepare import (
-        check_length,
-        choose_run_recipe,
-        plan_run,
-        prepare_run,
-    )
+    from motion_transfer.render.plan import describe_missing
     from motion_transfer.render.run import output_key, piece_of
 
-    output_format = choose_format(options.output, codec=options.codec, crf=options.crf)
     driver = pickle.loads(scanned())
     plan = plan_run(options, driver)
-    check_length(options, output_format, plan)
-    recipe = choose_run_recipe(options, plan, ignore)
-    run = prepare_run(options, output_format, driver, plan, recipe, pickle.loads(source()))
+    recipe = open_recipe(options)
+    run = prepare_run(options, driver, plan, recipe, pickle.loads(source()), ignore)
     check_unchanged(source_files)
     chunks = tuple(
         ChunkOutline(c.index, c.start, c.stop, piece_of(run, c), run.chunk_keys[c.index])
@@ -155,39 +162,40 @@ def prepare(
         len(plan.frames),
         float(len(plan.frames) / plan.frame_rate),
         recipe.name,
-        CHUNKS_AT_ONCE if recipe.name == "nhrr" else 1,
+        # a thread that draws for itself would gain nothing from a second chunk
+        CHUNKS_AT_ONCE if recipe.occupies != "nothing" else 1,
         output_key(run),
         describe_missing(plan.frames, plan.first, plan.frame_rate),
     )
-    return pickle.dumps(run, 5), outline
+    return pickle.dumps(run, PICKLE_PROTOCOL), outline
 
 
 def render(
     name: str,
     prepared: Fetch,
-    look_name: str,
+    source_name: str,
     appearance: Fetch,
     folder: Path,
     chunks: Sequence[tuple[int, Path, str]],
     with_sheet: bool,
 ) -> list[tuple[int, str]]:
-    """Render chunks to finished segments; index and digest of each.
+    """Render chunks to finished segments.
 
     Args:
-        name, look_name: of the prepared run and of the appearance, for what is kept warm.
-        chunks: index, a temporary path, and the segment's name in `folder`.
+        name, source_name: Tell the prepared run and the appearance from others that are kept warm.
+        chunks: Index, a temporary path, and the segment's name in `folder`.
+    Returns: Index and digest of each segment.
     Raises: InputError for a driver that is damaged or changed; RenderError; OutputError.
     """
     import torch
 
     from motion_transfer.media.publish import explain_disk_errors
     from motion_transfer.media.work import publish_piece
-    from motion_transfer.render.engine import Engine
-    from motion_transfer.render.sheet import ContactSheet
+    from motion_transfer.render.engine import ContactSheet, Engine
 
     run: Prepared = WARM.get(f"run {name}", lambda: pickle.loads(prepared()))
     renderer: Renderer = WARM.get(
-        f"renderer {look_name} {run.recipe}",
+        f"renderer {source_name} {run.recipe}",
         lambda: run.recipe.renderer(pickle.loads(appearance())),
     )
     reader = WARM.get(f"reader {run.driver}", run.driver.open)
@@ -204,26 +212,24 @@ def render(
         sheet=ContactSheet(folder, len(run.plan.frames)) if with_sheet else None,
     )
     with explain_disk_errors(folder):
-        plan_chunks = run.plan.chunks
-        engine.render(
-            [(plan_chunks[index], path) for index, path, _ in chunks],
-            torch.get_num_threads(),
-            finish,
-        )
+        wanted = [(run.plan.chunks[index], path) for index, path, _ in chunks]
+        engine.render(wanted, torch.get_num_threads(), finish)
     return digests
 
 
 def assemble(
     options: RenderOptions, prepared: Fetch, folder: Path, pictures: Path
 ) -> tuple[Path, bool, Files]:
-    """Join finished segments.
+    """Join finished segments, and make the report's pictures.
 
-    Returns: the output without its name yet, whether it has posters, its sound's file.
+    Args:
+        pictures: What their names begin with, see `write_posters`.
+    Returns: The output without its name yet, whether it has pictures, its sound's file.
     """
-    from motion_transfer.batch.poster import write_posters
+    from motion_transfer.batch.report import write_posters
     from motion_transfer.media.publish import explain_disk_errors
+    from motion_transfer.render.engine import ContactSheet
     from motion_transfer.render.run import assemble as join
-    from motion_transfer.render.sheet import ContactSheet
 
     run: Prepared = pickle.loads(prepared())
     files = sign_files(audio_files(options))
@@ -243,7 +249,7 @@ class _SharedFrames:
         self.stream = reader.stream
 
     def read(self, start: int, stop: int) -> Iterator[np.ndarray]:
-        """As `IuvReader.read`."""
+        """Read frames start..stop-1, see `IuvReader.read`."""
         wanted = (self._file, start, stop)
         if WARM.frames[0] == wanted:
             yield from WARM.frames[1]

@@ -27,8 +27,8 @@ class Workers(Protocol):
     """A fixed number of places where tasks run, one at a time in each.
 
     Attributes:
-        count: of places.
-        lost_error: what a future raises whose worker died.
+        count: How many places there are.
+        lost_error: What a future raises whose worker died.
     """
 
     count: int
@@ -43,21 +43,21 @@ class Workers(Protocol):
         ...
 
     def forget(self, name: str) -> None:
-        """Nobody needs a blob any more."""
+        """Drop a blob that nobody needs any more, if there is one of that name."""
         ...
 
     def stop(self, *, now: bool) -> None:
-        """End the workers; `now` without waiting for what they do."""
+        """End the workers; if `now`, without waiting for what they do."""
         ...
 
 
 class LocalWorkers:
-    """Processes of this machine; blobs go through files."""
+    """Workers that are processes of this machine, and hand each other blobs as files."""
 
     lost_error: tuple[type[BaseException], ...] = (BrokenProcessPool,)
 
     def __init__(self, count: int, scratch: Path) -> None:
-        """Args: scratch, an own folder for blobs, emptied here and removed by `stop`."""
+        """Start nobody yet; empty `scratch`, the folder for blobs, which `stop` removes."""
         self.count = count
         self._scratch = scratch
         shutil.rmtree(scratch, ignore_errors=True)
@@ -103,9 +103,9 @@ class LocalWorkers:
 
 
 def begin_worker(place: int, count: int, path: list[str]) -> None:
-    """Settle into a worker process: its share of the cores, its GPU, nobody's orphan."""
+    """Settle into a worker process: its share of the cores, its GPU, an end with its parent."""
     sys.path[:] = path
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # whatever the command's own handler does
     threading.Thread(target=_follow_parent, daemon=True).start()
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     import cv2
@@ -120,7 +120,7 @@ def begin_worker(place: int, count: int, path: list[str]) -> None:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Processes that begin inside never hear Ctrl-C: it is the scheduler's, who hears it after."""
+    """Keep Ctrl-C from processes that begin inside; the scheduler, whose it is, hears it after."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -132,4 +132,4 @@ def _follow_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])
-        os._exit(ORPHANED)
+        os._exit(ORPHANED)  # a thread cannot end its process in any kinder way

@@ -1,27 +1,27 @@
-"""`mt batch`."""
+"""`mt batch`: a manifest's jobs rendered, checked, counted, reported, and cleaned up after."""
 
 from __future__ import annotations
 
 import json
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from tqdm import tqdm
 
-if TYPE_CHECKING:
-    from motion_transfer.batch.events import BatchEvent
+from motion_transfer.cli.options import FILE, add_options
+from motion_transfer.cli.progress import CountBar, JsonPrinter
 
-MANIFEST = click.Path(path_type=Path)
-manifest_argument = click.argument("manifest", metavar="FILE", type=MANIFEST)
-set_option = click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="K=V",
-    help="Over a field of the manifest, or an option of all its jobs; may be repeated.",
+if TYPE_CHECKING:
+    from motion_transfer.batch.events import BatchEvent, BatchListener
+
+SETTINGS = "Over a field of the manifest, or an option of all its jobs; may be repeated."
+manifest_options = add_options(
+    [
+        click.argument("manifest", metavar="FILE", type=FILE),
+        click.option("--set", "settings", multiple=True, metavar="K=V", help=SETTINGS),
+    ]
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
@@ -37,8 +37,7 @@ def batch() -> None:
 
 
 @batch.command()
-@manifest_argument
-@set_option
+@manifest_options
 @click.option("--jobs", metavar="A:B", help="Only these jobs, counted from 0, B excluded.")
 @click.option("--workers", type=int, help="Processes; default: one for each GPU, or each core.")
 @click.option("--engine", default="local", metavar="local|ray", help="Where chunks are rendered.")
@@ -54,41 +53,35 @@ def batch() -> None:
 def run(jobs: str | None, quiet: bool, as_json: bool, **options: Any) -> int:
     """Render what is missing. Exit code: 0 all is done, 1 jobs failed, 130 interrupted."""
     from motion_transfer.batch.run import BatchOptions, run_batch
-    from motion_transfer.render.options import parse_range
+    from motion_transfer.option import parse_range
 
     chosen = parse_range(jobs, "jobs") if jobs else (None, None)
-    printer = _Printer(quiet=quiet, as_json=as_json)
-    try:
-        tally = run_batch(BatchOptions(chosen=chosen, **options), printer)
-    finally:
-        printer.close()
+    with CountBar("", unit="frame", quiet=quiet or as_json) as bar:
+        listener = JsonPrinter() if as_json else _reporter(bar, quiet=quiet)
+        tally = run_batch(BatchOptions(chosen=chosen, **options), listener)
     return 1 if tally.failed else 0
 
 
 @batch.command()
-@manifest_argument
-@set_option
+@manifest_options
 def validate(manifest: Path, settings: tuple[str, ...]) -> None:
     """Check a manifest and that its inputs are there; render nothing."""
-    from motion_transfer.batch.run import read_batch
-    from motion_transfer.batch.run import validate as check
+    from motion_transfer.batch.run import check_batch, read_batch
 
     read = read_batch(manifest, settings)
-    check(read)
+    check_batch(read)
     click.echo(f"{manifest}: {len(read.jobs)} jobs, all inputs are there")
 
 
 @batch.command()
-@manifest_argument
-@set_option
+@manifest_options
 @json_option
 def status(manifest: Path, settings: tuple[str, ...], as_json: bool) -> None:
     """How many jobs are done, failed, to do."""
-    from motion_transfer.batch.run import read_batch
-    from motion_transfer.batch.run import status as count
+    from motion_transfer.batch.run import count_jobs, read_batch
 
     read = read_batch(manifest, settings)
-    counts = count(read)
+    counts = count_jobs(read)
     if as_json:
         click.echo(json.dumps(counts))
         return
@@ -100,8 +93,7 @@ def status(manifest: Path, settings: tuple[str, ...], as_json: bool) -> None:
 
 
 @batch.command()
-@manifest_argument
-@set_option
+@manifest_options
 def report(manifest: Path, settings: tuple[str, ...]) -> None:
     """Write the report anew: a page and JSON, beside the outputs."""
     from motion_transfer.batch.report import write_report
@@ -112,8 +104,7 @@ def report(manifest: Path, settings: tuple[str, ...]) -> None:
 
 
 @batch.command()
-@manifest_argument
-@set_option
+@manifest_options
 def clean(manifest: Path, settings: tuple[str, ...]) -> None:
     """Remove what is kept between runs: journals and half-done work. Outputs stay."""
     from motion_transfer.batch.run import read_batch
@@ -123,65 +114,42 @@ def clean(manifest: Path, settings: tuple[str, ...]) -> None:
     click.echo(f"removed {count} work folders")
 
 
-class _Printer:
-    """Events as lines, or as JSON; a bar of frames on a terminal."""
-
-    def __init__(self, *, quiet: bool, as_json: bool) -> None:
-        self._quiet = quiet
-        self._as_json = as_json
-        self._bar: tqdm | None = None
-        if sys.stderr.isatty() and not quiet and not as_json:
-            self._bar = tqdm(total=0, unit="frame", leave=False, dynamic_ncols=True)
-
-    def close(self) -> None:
-        """Take the bar off the screen."""
-        if self._bar is not None:
-            self._bar.close()
-
-    def __call__(self, event: BatchEvent) -> None:
-        from motion_transfer.batch import events
-
-        if self._as_json:
-            fields = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(event).items()}
-            click.echo(json.dumps({"event": type(event).__name__.lower(), **fields}))
-            return
-        match event:
-            case events.JobPlanned() if self._bar is not None:
-                self._bar.total = (self._bar.total or 0) + event.frame_count
-                self._bar.update(event.done_count)
-            case events.JobFrames() if self._bar is not None:
-                self._bar.update(event.frame_count)
-            case events.JobFailed():
-                tqdm.write(f"mt: failed: {event.name}: {event.message}", file=sys.stderr)
-            case _:
-                self._say(_words(event))
-
-    def _say(self, words: tuple[str, bool]) -> None:
-        text, is_result = words
-        if text and not self._quiet:
-            tqdm.write(text, file=sys.stdout if is_result else sys.stderr)
-
-
-def _words(event: BatchEvent) -> tuple[str, bool]:
-    """A sentence, and whether it is a result (stdout) or news (stderr)."""
+def _reporter(bar: CountBar, *, quiet: bool) -> BatchListener:
+    """Make a listener that says what a person should read, beside the bar of all jobs' frames."""
     from motion_transfer.batch import events
 
-    match event:
-        case events.JobNotice():
-            return f"mt: note: {event.name}: {event.message}", False
-        case events.JobDone():
-            rate = event.frame_count / max(event.seconds, 1e-9)
-            return f"wrote {event.output}: {event.frame_count} frames ({rate:.0f} frames/s)", True
-        case events.BatchStopping():
-            return (
-                f"mt: finishing {event.running_count} running chunks; Ctrl-C now stops at once",
-                False,
-            )
-        case events.BatchFinished():
-            return (
-                f"{event.done_count} done, {event.current_count} up to date,"
-                f" {event.failed_count} failed, {event.left_count} left; {event.seconds:.1f} s,"
-                f" {event.feature_maps} sources prepared",
-                True,
-            )
-    return "", False
+    frame_count = 0
+
+    def say(words: str, *, err: bool = True) -> None:  # a plain print would tear the bar
+        tqdm.write(words, file=sys.stderr if err else sys.stdout)
+
+    def report(event: BatchEvent) -> None:
+        nonlocal frame_count
+        match event:
+            case events.JobPlanned():
+                frame_count += event.frame_count
+                bar.advance(event.done_count, frame_count)
+            case events.JobFrames():
+                bar.advance(event.frame_count)
+            case events.JobFailed():
+                say(f"mt: failed: {event.name}: {event.message}")
+            case _ if quiet:
+                pass
+            case events.JobNotice():
+                say(f"mt: note: {event.name}: {event.message}")
+            case events.JobDone():
+                rate = event.frame_count / max(event.seconds, 1e-9)  # a coarse clock may say 0
+                result = f"wrote {event.output}: {event.frame_count} frames ({rate:.0f} frames/s)"
+                say(result, err=False)
+            case events.BatchStopping():
+                count = event.running_count
+                say(f"mt: finishing {count} running chunks; Ctrl-C now stops at once")
+            case events.BatchFinished():
+                result = (
+                    f"{event.done_count} done, {event.current_count} up to date,"
+                    f" {event.failed_count} failed, {event.left_count} left; {event.seconds:.1f} s,"
+                    f" {event.feature_maps} sources prepared"
+                )
+                say(result, err=False)
+
+    return report

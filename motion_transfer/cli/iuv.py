@@ -1,31 +1,24 @@
-"""`mt iuv`."""
+"""`mt iuv`: IUV estimated, converted, and repaired."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import click
 
-from motion_transfer.cli.progress import CountBar
-from motion_transfer.cli.sections import SectionCommand, SectionOption
-
-FILE = click.Path(path_type=Path)
-
-
-def section(heading: str) -> Any:
-    """An option decorator whose options stand under one heading."""
-    return partial(click.option, cls=SectionOption, section=heading)
-
+from motion_transfer.cli.options import FILE, SectionCommand, add_options, section
+from motion_transfer.cli.progress import CountBar, note
+from motion_transfer.option import parse_rate
 
 input_option = section("Input")
 estimate_option = section("Estimator")
 repair_option = section("Repair")
 output_option = section("Output")
 
-INPUT_OPTIONS = (
+INPUT_OPTIONS = [
     input_option(
         "--iuv-order", metavar="ORDER", help="Channels of the file's RGB, iuv or vui; else found."
     ),
@@ -35,8 +28,8 @@ INPUT_OPTIONS = (
         metavar="fail|hold|background",
         help="Numbers missing in a folder: stop (default), repeat the frame before, or nobody.",
     ),
-)
-OUTPUT_OPTIONS = (
+]
+OUTPUT_OPTIONS = [
     output_option(
         "-o",
         "--output",
@@ -54,18 +47,7 @@ OUTPUT_OPTIONS = (
     output_option("--fps", metavar="RATE", help="Of an .mkv; default: the input's, or 30."),
     output_option("--force", is_flag=True, help="Replace an existing output."),
     output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
-)
-
-
-def with_options(*groups: tuple[Any, ...]) -> Any:
-    """A decorator that adds options, in order."""
-
-    def add(function: Any) -> Any:
-        for option in reversed([option for group in groups for option in group]):
-            function = option(function)
-        return function
-
-    return add
+]
 
 
 class IuvGroup(click.Group):
@@ -75,7 +57,7 @@ class IuvGroup(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         names = (*self.commands, *self.get_help_option_names(ctx))
-        if args and args[0] not in names:
+        if args and args[0] not in names:  # click would take a file for an unknown command
             args = [self.default, *args]
         return super().parse_args(ctx, args)
 
@@ -126,8 +108,8 @@ def iuv() -> None:
     help="Write the people's alpha, too: me_IUV.png and me_alpha.png, dance.mkv and"
     " dance_alpha.mkv.",
 )
-@with_options(OUTPUT_OPTIONS)
-def estimate(source: Path, output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
+@add_options(OUTPUT_OPTIONS)
+def estimate(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
     """Find the people of raw pictures and write their IUV.
 
     Photos are turned upright as their EXIF says, videos as their rotation flag says. A video's
@@ -141,33 +123,27 @@ def estimate(source: Path, output: Path, fps: str | None, quiet: bool, **options
     mt iuv me.jpg -o me_IUV.png --alpha
     """
     from motion_transfer.estimate.run import EstimateOptions, estimate_iuv
-    from motion_transfer.media.alpha_writing import name_alpha
-    from motion_transfer.render.missing import list_stretches
-    from motion_transfer.render.options import parse_rate
+    from motion_transfer.media.iuv.writing import name_alpha
+    from motion_transfer.render.plan import list_stretches
 
-    settings = EstimateOptions(
-        source=source, output=output, frame_rate=parse_rate(fps) if fps else None, **options
-    )
+    settings = EstimateOptions(output=output, frame_rate=_rate(fps), **options)
     with CountBar("finding people", unit="frame", quiet=quiet) as bar:
         report = estimate_iuv(settings, bar.advance)
-    if quiet:
-        return
-    _say_notes(report.notes)
-    seen = report.summary
+    seen, notes = report.summary, list(report.notes)
     if seen.empty:
         shown = {"hold": "the frame before", "background": "background only"}[settings.missing]
         times = list_stretches(seen.empty, 0, report.frame_rate)
-        _say_notes([f"nobody found in {seen.empty_count} frames, {shown}: {times}"])
+        notes.append(f"nobody found in {seen.empty_count} frames, {shown}: {times}")
     shots = f", {len(seen.shots)} shots" if len(seen.shots) > 1 else ""
     people = f", up to {seen.most_people} people" if seen.most_people > 1 else ""
     written = f"{output} and {name_alpha(output)}" if settings.alpha else output
-    click.echo(f"wrote {written}: {seen.frame_count} frames{shots}{people}")
+    _report(quiet, notes, f"wrote {written}: {seen.frame_count} frames{shots}{people}")
 
 
 @iuv.command(cls=SectionCommand)
 @click.argument("source", metavar="IN", type=FILE)
-@with_options(INPUT_OPTIONS, OUTPUT_OPTIONS)
-def convert(source: Path, output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
+@add_options([*INPUT_OPTIONS, *OUTPUT_OPTIONS])
+def convert(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
     """Rewrite IUV in another form, without loss.
 
     IN is a folder of IUV images or arrays, one IUV image, a lossless video, a .npy or .npz stack,
@@ -179,17 +155,12 @@ def convert(source: Path, output: Path, fps: str | None, quiet: bool, **options:
     mt iuv convert dance_iuv/ -o dance.mkv --fps 25
     mt iuv convert caffe2_iuv/ -o rgb_iuv/ --order iuv
     """
-    from motion_transfer.media.iuv_convert import ConvertOptions, convert_iuv
-    from motion_transfer.render.options import parse_rate
+    from motion_transfer.media.iuv.convert import ConvertOptions, convert_iuv
 
-    settings = ConvertOptions(
-        source=source, output=output, frame_rate=parse_rate(fps) if fps else None, **options
-    )
+    settings = ConvertOptions(output=output, frame_rate=_rate(fps), **options)
     with CountBar("converting", unit="frame", quiet=quiet) as bar:
         written, notes = convert_iuv(settings, bar.advance)
-    if not quiet:
-        _say_notes(notes)
-        click.echo(f"wrote {output}: {written.frame_count} frames")
+    _report(quiet, notes, f"wrote {output}: {written.frame_count} frames")
 
 
 @iuv.command(cls=SectionCommand)
@@ -207,8 +178,8 @@ def convert(source: Path, output: Path, fps: str | None, quiet: bool, **options:
     help="Remove regions of one part, and holes, of fewer than N pixels.",
 )
 @repair_option("--smooth", is_flag=True, help="Steady part borders, and U and V within parts.")
-@with_options(INPUT_OPTIONS, OUTPUT_OPTIONS)
-def repair(source: Path, output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
+@add_options([*INPUT_OPTIONS, *OUTPUT_OPTIONS])
+def repair(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
     """Fill gaps, remove speckles, and steady a driver; any length.
 
     Flicker is reported before and after: the share of the body's pixels whose part comes and goes
@@ -217,24 +188,27 @@ def repair(source: Path, output: Path, fps: str | None, quiet: bool, **options: 
     \b
     mt iuv repair dance_iuv/ -o steady.mkv --fill-gaps interpolate --speckle 20 --smooth
     """
-    from motion_transfer.render.options import parse_rate
     from motion_transfer.repair.run import RepairOptions, repair_iuv
 
-    settings = RepairOptions(
-        source=source, output=output, frame_rate=parse_rate(fps) if fps else None, **options
-    )
+    settings = RepairOptions(output=output, frame_rate=_rate(fps), **options)
     with CountBar("repairing", unit="frame", quiet=quiet) as bar:
         report = repair_iuv(settings, bar.advance)
+    old, new = report.before, report.after
+    _report(
+        quiet,
+        report.notes,
+        f"wrote {output}: {new.frame_count} frames; empty frames {old.empty_frames} ->"
+        f" {new.empty_frames}, part flicker {old.parts:.2%} -> {new.parts:.2%}, UV flicker"
+        f" {old.uv:.2f} -> {new.uv:.2f} of 255",
+    )
+
+
+def _rate(fps: str | None) -> Fraction | None:
+    return parse_rate(fps) if fps else None
+
+
+def _report(quiet: bool, notes: Iterable[str], result: str) -> None:
     if not quiet:
-        _say_notes(report.notes)
-        old, new = report.before, report.after
-        click.echo(
-            f"wrote {output}: {new.frame_count} frames; empty frames {old.empty_frames} ->"
-            f" {new.empty_frames}, part flicker {old.parts:.2%} -> {new.parts:.2%}, UV flicker"
-            f" {old.uv:.2f} -> {new.uv:.2f} of 255"
-        )
-
-
-def _say_notes(notes: Iterable[str]) -> None:
-    for note in notes:
-        click.echo(f"mt: note: {note}", err=True)
+        for words in notes:
+            note(words)
+        click.echo(result)

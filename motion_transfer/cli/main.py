@@ -26,12 +26,15 @@ COMMANDS = {
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",
     "info": "Versions, device, renderers, sizes of a run; part names.",
 }
-INTERRUPTED = 130
+HOMES = {"demo": "run", "inspect": "info", "models": "info"}
+"""Commands that stand in another one's module."""
+
+INTERRUPTED = 130  # 128 and the signal's number, as shells have it
 TERMINATED = 143
 
 
 class LazyGroup(click.Group):
-    """Knows its commands by name and imports only the one that is used: help stays instant."""
+    """Knows its commands by name and imports only the one that is used: help is instant."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -39,7 +42,7 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f"motion_transfer.cli.{cmd_name}")
+        module = import_module(f"motion_transfer.cli.{HOMES.get(cmd_name, cmd_name)}")
         # `eval_` for `eval`: a function does not take a builtin's name
         return getattr(module, cmd_name, None) or getattr(module, f"{cmd_name}_")
 
@@ -61,7 +64,7 @@ def cli() -> None:
 
 
 class Terminated(BaseException):
-    """SIGTERM; not a KeyboardInterrupt, as click would take it for Ctrl-C."""
+    """Raised by SIGTERM; not a KeyboardInterrupt, which click would take for Ctrl-C."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -88,7 +91,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def entry_point() -> None:
-    """What the installed `mt` script calls."""
+    """Run the installed `mt` script."""
     sys.exit(main())
 
 

@@ -1,24 +1,18 @@
-"""`mt people`."""
+"""`mt people`: drivers from motion, and photos of synthetic people."""
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
+from motion_transfer.cli.options import FILE, SectionCommand, section
 from motion_transfer.cli.progress import CountBar, long_wait
-from motion_transfer.cli.sections import SectionCommand, SectionOption
+from motion_transfer.option import parse_rate, parse_size
 
-FILE = click.Path(path_type=Path)
 SHARE = click.FloatRange(0, 1)
-
-
-def section(heading: str) -> Any:
-    """An option decorator whose options stand under one heading."""
-    return partial(click.option, cls=SectionOption, section=heading)
-
+BODY_OPTIONS = ("gender", "age", "height", "weight", "muscle", "proportions")
 
 motion_option = section("Motion")
 body_option = section("Body")
@@ -75,13 +69,7 @@ def people() -> None:
 @output_option("--force", is_flag=True, help="Replace an existing output.")
 @output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def drive(
-    motion: str,
-    output: Path,
-    fps: str,
-    size: str,
-    force: bool,
-    quiet: bool,
-    **options: Any,
+    motion: str, output: Path, fps: str, size: str, force: bool, quiet: bool, **options: Any
 ) -> None:
     """Make a driver (IUV frames) from a motion.
 
@@ -93,14 +81,11 @@ def drive(
     mt people drive turntable --frames 120 --azimuth 30 -o turn.mkv
     mt people drive capture.bvh --fps 25 --gender 1 --size 384x512 -o capture.mkv
     """
-    from motion_transfer.people.driver import MotionOptions, check_motion
-    from motion_transfer.people.recording import record_motion
-    from motion_transfer.people.stream import parse_size
-    from motion_transfer.render.options import parse_rate
+    from motion_transfer.people import MotionOptions, Shape, check_motion, record_motion
 
-    check_motion(motion)
+    check_motion(motion)  # before the body model is prepared, which may take minutes
     body = {name: options.pop(name) for name in BODY_OPTIONS}
-    shape = _shape({name: value for name, value in body.items() if value is not None})
+    shape = Shape(**{name: value for name, value in body.items() if value is not None})
     settings = MotionOptions(
         motion=motion, frame_rate=parse_rate(fps), size=parse_size(size), shape=shape, **options
     )
@@ -143,8 +128,7 @@ def render(quiet: bool, size: str, **options: Any) -> None:
     mt people render --count 100 --out people/
     mt people render --count 20 --views 4 --size 512x512 --framing upper --out heads/
     """
-    from motion_transfer.people.album import AlbumOptions, write_album
-    from motion_transfer.people.stream import parse_size
+    from motion_transfer.people import AlbumOptions, write_album
 
     settings = AlbumOptions(size=parse_size(size), **options)
     prepare_body_model(quiet)
@@ -156,18 +140,9 @@ def render(quiet: bool, size: str, **options: Any) -> None:
         click.echo(f"{settings.out}: {added} {who} added{there}, {settings.views} photos each")
 
 
-BODY_OPTIONS = ("gender", "age", "height", "weight", "muscle", "proportions")
-
-
-def _shape(values: dict[str, float]) -> Any:
-    from motion_transfer.people.figure.body import Shape
-
-    return Shape(**values)
-
-
 def prepare_body_model(quiet: bool) -> None:
-    """Where the body model has to compute its cache first, say so while it does."""
-    from motion_transfer.people.figure.body import FIRST_USE, is_cached, load_body_model
+    """Let the body model compute its cache if it has none yet, and say so while it does."""
+    from motion_transfer.people import FIRST_USE, is_cached, load_body_model
 
     if not is_cached():
         with long_wait(FIRST_USE, quiet=quiet):

@@ -1,4 +1,4 @@
-"""`mt preview`."""
+"""`mt preview`: a run before it is rendered, in the browser or as one picture."""
 
 from __future__ import annotations
 
@@ -10,35 +10,34 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
 from motion_transfer.cli.run import pair_garments
-from motion_transfer.cli.sections import SectionCommand, SectionOption, loose_run_options
 from motion_transfer.errors import InputError
-from motion_transfer.render.option import list_options
+from motion_transfer.extras import require_extra
+from motion_transfer.option import list_options, options_from_words
 from motion_transfer.render.options import RenderOptions
 
-PREVIEW: dict[str, Any] = {"cls": SectionOption, "section": "Preview"}
+preview_option = section("Preview")
 
 
 @click.command(cls=SectionCommand)
-@click.argument("manifest", required=False, type=click.Path(path_type=Path))
-@click.option("--job", type=int, default=0, help="Of the manifest, counted from 0.", **PREVIEW)
-@click.option(
+@click.argument("manifest", required=False, type=FILE)
+@preview_option("--job", type=int, default=0, help="Of the manifest, counted from 0.")
+@preview_option(
     "--frame",
     type=int,
     help="No page: write this frame of the driver to -o FILE.png, as the video will show it.",
-    **PREVIEW,
 )
-@click.option(
+@preview_option(
     "--job-file",
-    type=click.Path(path_type=Path),
+    type=FILE,
     default=Path("preview.yaml"),
     show_default=True,
     help='Where "Save job" writes.',
-    **PREVIEW,
 )
-@click.option("--port", type=int, default=0, help="Default: any that is free.", **PREVIEW)
-@click.option("--no-open", is_flag=True, help="Print the link, and open no browser.", **PREVIEW)
-@loose_run_options
+@preview_option("--port", type=int, default=0, help="Default: any that is free.")
+@preview_option("--no-open", is_flag=True, help="Print the link, and open no browser.")
+@described_options(RenderOptions, required=False)
 @click.pass_context
 def preview(
     context: click.Context,
@@ -62,16 +61,14 @@ def preview(
     mt preview jobs/shoot.yaml --job 3
     mt preview --source photo.png --driver iuv_frames/ --frame 12 -o frame.png
     """
-    from motion_transfer.preview.opening import options_of_job, options_of_words
-
     words["garments"] = pair_garments(garments, garment_parts)
     if manifest is not None:
         _refuse_others(context, manifest)
-        options = options_of_job(manifest, job)
+        options = _options_of_job(manifest, job)
     else:
-        options = options_of_words(words)
+        options = _options_of_words(words)
     if frame is not None:
-        from motion_transfer.preview.single import write_frame
+        from motion_transfer.preview.views import write_frame
 
         if words["output"] is None:
             raise InputError("--frame needs -o FILE.png")
@@ -82,20 +79,48 @@ def preview(
 
 
 def _refuse_others(context: click.Context, manifest: Path) -> None:
-    """Raises: InputError for options of a run beside a manifest, which has its own."""
+    """Raise InputError for options of a run beside a manifest, which has its own."""
+    # --frame needs -o of its own: a job's output is a video
     own = {entry.name for entry in list_options(RenderOptions)} - {"output", "force"}
     for name in own & context.params.keys():
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise InputError(f"{manifest} says what its jobs do; leave out --{name}")
 
 
-def _serve(options: RenderOptions, job_file: Path, port: int, *, open_browser: bool) -> None:
-    from motion_transfer.preview.opening import open_server, open_session
+def _options_of_job(manifest: Path, number: int) -> RenderOptions:
+    from motion_transfer.batch.run import read_batch
 
-    server = open_server(port)
+    jobs = read_batch(manifest).jobs
+    if not 0 <= number < len(jobs):
+        raise InputError(f"job {number} asked for, but {manifest} has {len(jobs)}, from 0")
+    return jobs[number].options
+
+
+def _options_of_words(words: dict[str, Any]) -> RenderOptions:
+    for name in ("source", "driver"):
+        if words[name] is None:
+            raise InputError(f"--{name} is missing; give a source and a driver, or a manifest")
+    output = words["output"]
+    if not output:
+        from motion_transfer.batch.expand import name_driver
+
+        output = f"{Path(words['source']).stem}_{name_driver(words['driver'])}.mp4"
+    return options_from_words(RenderOptions, {**words, "output": output})
+
+
+def _serve(options: RenderOptions, job_file: Path, port: int, *, open_browser: bool) -> None:
+    require_extra("preview")
+    from motion_transfer.preview.server import PreviewServer
+
+    def open_session() -> Any:
+        from motion_transfer.preview.session import Session  # loads what draws: seconds
+
+        return Session(options, job_file)
+
+    server = PreviewServer(port)
     click.echo(server.link)
-    sys.stdout.flush()
+    sys.stdout.flush()  # whoever reads it from a pipe waits for it
     if open_browser:
         click.launch(server.link)
     with contextlib.suppress(KeyboardInterrupt):  # the way to end it
-        server.serve(lambda: open_session(options, job_file))
+        server.serve(open_session)

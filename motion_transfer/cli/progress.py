@@ -1,4 +1,4 @@
-"""Events to a person (progress bar, one line at the end) or to a program (JSON lines)."""
+"""What commands say while they work: a bar and sentences for a person, or JSON for a program."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
 import click
 from tqdm import tqdm
 
-from motion_transfer.render.events import Event, Finished, FramesDone, Listener, Notice, Stage
+from motion_transfer.drawing.renderers import RENDERERS
+from motion_transfer.events import Event, Finished, FramesDone, Listener, Notice, Stage
 
 STAGE_WORDS = {
     "compare": "comparing bodies",
@@ -23,33 +25,36 @@ STAGE_WORDS = {
     "scan": "reading driver",
     "render": "rendering",
 }
-RENDERER_WORDS = {
-    "texture": "texture renderer: a draft, no network",
-    "nhrr": "nhrr renderer",
-}
+_open_bar = partial(tqdm, leave=False, dynamic_ncols=True)
+
+
+def note(words: str, *, quiet: bool = False) -> None:
+    """Say something that a person should know, though the work goes on."""
+    if not quiet:
+        click.echo(f"mt: note: {words}", err=True)
 
 
 def choose_listener(*, quiet: bool, as_json: bool) -> Listener:
-    """JSON lines, nothing, or a bar and sentences; the bar only on a terminal."""
+    """Choose JSON lines, nothing, or a bar and sentences; the bar is for terminals only."""
     if as_json:
         return JsonPrinter()
     return Reporter(show_bar=sys.stderr.isatty(), quiet=quiet)
 
 
 class JsonPrinter:
-    """One JSON object a line on stdout, `event` naming its kind."""
+    """Prints events of any kind on stdout, one JSON object a line, whose `event` names the kind."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # events come from any thread
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, event: Any) -> None:
         fields = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(event).items()}
         with self._lock:
             click.echo(json.dumps({"event": type(event).__name__.lower(), **fields}))
 
 
 class Reporter:
-    """Progress on stderr, the result on stdout."""
+    """Shows the progress of a run on stderr, and its result on stdout."""
 
     def __init__(self, *, show_bar: bool, quiet: bool) -> None:
         self._show_bar = show_bar and not quiet
@@ -61,42 +66,33 @@ class Reporter:
         with self._lock:
             match event:
                 case Stage():
-                    self._begin(event)
+                    self._close()
+                    if self._show_bar:
+                        words = STAGE_WORDS.get(event.name, event.name)
+                        self._bar = _open_bar(total=event.frame_count, desc=words, unit="frame")
                 case FramesDone():
                     if self._bar is not None:
                         self._bar.update(event.frame_count)
                         if self._bar.n >= self._bar.total:
-                            self.close()
+                            self._close()
                 case Notice() if not self._quiet:
-                    self.close()
-                    click.echo(f"mt: note: {event.message}", err=True)
+                    self._close()
+                    note(event.message)
                 case Finished() if not self._quiet:
                     click.echo(describe(event))
 
-    def close(self) -> None:
-        """Take the bar off the screen."""
+    def _close(self) -> None:
         if self._bar is not None:
             self._bar.close()
             self._bar = None
 
-    def _begin(self, stage: Stage) -> None:
-        self.close()
-        if self._show_bar:
-            self._bar = tqdm(
-                total=stage.frame_count,
-                desc=STAGE_WORDS.get(stage.name, stage.name),
-                unit="frame",
-                leave=False,
-                dynamic_ncols=True,
-            )
-
 
 def describe(event: Finished) -> str:
-    """The one line that a person reads when all is done."""
+    """Write the one line that a person reads when all is done."""
     rate = event.frame_count / event.render_seconds
     return (
         f"wrote {event.output}: {event.frame_count} frames, {event.duration_seconds:.2f} s"
-        f" ({RENDERER_WORDS[event.renderer]}; {event.wall_seconds:.1f} s in all,"
+        f" ({RENDERERS[event.renderer].report}; {event.wall_seconds:.1f} s in all,"
         f" {rate:.0f} frames/s while rendering)"
     )
 
@@ -111,7 +107,7 @@ class CountBar:
 
     def __enter__(self) -> Self:
         if self._show:
-            self._bar = tqdm(**self._settings, leave=False, dynamic_ncols=True)
+            self._bar = _open_bar(**self._settings)
         return self
 
     def __exit__(self, *_error: object) -> None:
@@ -119,7 +115,7 @@ class CountBar:
             self._bar.close()
 
     def advance(self, count: int, total: int | None = None) -> None:
-        """So many more are done, of so many where that was not known before."""
+        """Count so many more as done; `total` tells of how many, if that is known only now."""
         if self._bar is not None:
             self._bar.total = total or self._bar.total
             self._bar.update(count)
@@ -129,16 +125,16 @@ class CountBar:
 def long_wait(words: str, *, quiet: bool) -> Iterator[None]:
     """Say what is waited for, and on a terminal for how long already, while the block runs."""
     if quiet or not sys.stderr.isatty():
-        if not quiet:
-            click.echo(f"mt: note: {words}", err=True)
+        note(words, quiet=quiet)
         yield
         return
     ended = threading.Event()
 
     def show() -> None:
         began = time.monotonic()
-        while not ended.wait(0.5):
+        while not ended.wait(0.5):  # s: often enough for a clock of whole seconds
             click.echo(f"\r{words}: {time.monotonic() - began:.0f} s", err=True, nl=False)
+        # as many blanks as the longest time would take
         click.echo("\r" + " " * (len(words) + 12) + "\r", err=True, nl=False)
 
     clock = threading.Thread(target=show, daemon=True)

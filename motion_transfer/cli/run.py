@@ -1,29 +1,26 @@
-"""`mt run`."""
+"""`mt run`, and `mt demo`, which is a run of what ships with the program."""
 
 from __future__ import annotations
 
+from importlib.resources import as_file, files
+from pathlib import Path
 from typing import Any
 
 import click
 
+from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
 from motion_transfer.cli.progress import choose_listener
-from motion_transfer.cli.sections import SectionCommand, SectionOption, run_options
 from motion_transfer.errors import InputError
+from motion_transfer.option import options_from_words
+from motion_transfer.render.options import RenderOptions
+
+output_option = section("Output")
 
 
 @click.command(cls=SectionCommand)
-@run_options
-@click.option(
-    "-q", "--quiet", is_flag=True, cls=SectionOption, section="Output", help="Say only errors."
-)
-@click.option(
-    "--json",
-    "as_json",
-    is_flag=True,
-    cls=SectionOption,
-    section="Output",
-    help="Print events as JSON lines.",
-)
+@described_options(RenderOptions)
+@output_option("-q", "--quiet", is_flag=True, help="Say only errors.")
+@output_option("--json", "as_json", is_flag=True, help="Print events as JSON lines.")
 def run(
     garments: tuple[str, ...],
     garment_parts: tuple[str, ...],
@@ -42,16 +39,15 @@ def run(
     mt run --source me.png --driver me_IUV.png --garment dress.png \\
            --garment-parts torso,upper-legs --background photo -o dressed.png
     """
-    from motion_transfer.render.options import options_from_words
     from motion_transfer.render.run import run as render
 
     pairs = pair_garments(garments, garment_parts)
-    options = options_from_words({**words, "garments": pairs})
+    options = options_from_words(RenderOptions, {**words, "garments": pairs})
     render(options, choose_listener(quiet=quiet, as_json=as_json))
 
 
 def pair_garments(garments: tuple[str, ...], parts: tuple[str, ...]) -> list[dict[str, str]]:
-    """`PHOTO[,IUV]` and their parts, matched by order. Raises: InputError if one has no partner."""
+    """Match `PHOTO[,IUV]` with their parts, by order. Raises: InputError if one has no partner."""
     if len(garments) != len(parts):
         raise InputError(
             f"{len(garments)} --garment but {len(parts)} --garment-parts; give one for each"
@@ -60,3 +56,40 @@ def pair_garments(garments: tuple[str, ...], parts: tuple[str, ...]) -> list[dic
         dict(zip(("photo", "iuv"), garment.split(",", 1), strict=False)) | {"parts": words}
         for garment, words in zip(garments, parts, strict=True)
     ]
+
+
+@click.command()
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    default=Path("demo.mp4"),
+    show_default=True,
+    help="As in `mt run`.",
+)
+@click.option(
+    "--photo-alone",
+    is_flag=True,
+    help="A photo of an astronaut, without IUV, waves. Needs `mt models fetch`, once.",
+)
+@click.option("--compare/--plain", default=True, help="Source, IUV and result, or the result only.")
+@click.option("--force", is_flag=True, help="Replace an existing output.")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@click.option("--json", "as_json", is_flag=True, help="Print events as JSON lines.")
+def demo(
+    output: Path, photo_alone: bool, compare: bool, force: bool, quiet: bool, as_json: bool
+) -> None:
+    """Render a photo and a driver that ship with the program (synthetic, CC0)."""
+    from motion_transfer.render.run import run as render
+
+    with as_file(files("motion_transfer.demo")) as folder:  # also where a package is an archive
+        render(
+            RenderOptions(
+                source=folder / ("astronaut.jpg" if photo_alone else "source.png"),
+                driver=folder / ("wave.mkv" if photo_alone else "driver.mkv"),
+                output=output,
+                compare=compare,
+                force=force,
+            ),
+            choose_listener(quiet=quiet, as_json=as_json),
+        )

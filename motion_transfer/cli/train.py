@@ -1,4 +1,4 @@
-"""`mt train`."""
+"""`mt train`, and `mt train iuv` for the network that paints IUV."""
 
 from __future__ import annotations
 
@@ -6,97 +6,67 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
+from dataclasses import fields
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn, Self
 
 import click
 from tqdm import tqdm
 
+from motion_transfer.cli.options import SectionCommand, described_options, section
 from motion_transfer.cli.people import prepare_body_model
 from motion_transfer.cli.progress import CountBar
-from motion_transfer.cli.sections import SectionCommand, SectionOption
 from motion_transfer.errors import InputError
+from motion_transfer.training.config import (
+    LOSSES,
+    PEOPLE,
+    SECTIONS,
+    check_value,
+    parse_assignment,
+    read_settings,
+    write_toml,
+)
 
 FILE = click.Path(path_type=Path)
-SETTINGS = {  # option: the setting that it stands for
-    "data": "data.source",
-    "images": "data.images",
-    "people": "data.people",
-    "people_cache": "data.people_cache",
-    "skip_broken": "data.skip_broken",
-    "preset": "model.preset",
-    "variant": "model.variant",
-    "init": "run.init",
-    "steps": "run.steps",
-    "seed": "run.seed",
-    "licence": "run.licence",
-    "batch_size": "optimiser.batch_size",
-    "perceptual": "losses.perceptual",
-    "identity": "losses.identity",
-    "adversarial": "losses.adversarial",
-    "precision": "speed.precision",
-    "compile_networks": "speed.compile",
-    "workers": "speed.workers",
-}
-
-
-def section(heading: str) -> Any:
-    """An option decorator whose options stand under one heading."""
-    return partial(click.option, cls=SectionOption, section=heading)
-
-
 run_option = section("Run")
-data_option = section("Data")
-model_option = section("Model")
-loss_option = section("Losses (the paper's; one without its network is an error)")
+loss_option = section(LOSSES)
 speed_option = section("Speed")
 
 
-@click.command(cls=SectionCommand)
+def setting_options(command: Any) -> Any:
+    """Add the options that settings describe, in the order of the headings."""
+    for name in reversed(("data", "model", "run", "losses", "optimiser", "speed")):
+        command = described_options(SECTIONS[name])(command)
+    return command
+
+
+class TrainGroup(SectionCommand, click.Group):
+    """A command with options under headings, below which other commands stand."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_options(ctx, formatter)
+        self.format_commands(ctx, formatter)
+
+
+@click.group(cls=TrainGroup, invoke_without_command=True, subcommand_metavar="[iuv ...]")
 @run_option("-o", "--output", type=FILE, metavar="RUN", help="A new folder for the run.")
 @run_option("--resume", type=FILE, metavar="RUN", help="Go on with a run that was stopped.")
 @run_option("--config", type=FILE, help="A train.toml; options and --set come after it.")
 @run_option(
     "--set", "assignments", multiple=True, metavar="SECTION.KEY=VALUE", help="Any setting of it."
 )
-@run_option("--steps", type=int, help="Updates in all; default 100000.")
-@run_option("--seed", type=int, help="Of weights, order and crops; default 0.")
-@run_option("--licence", help="Of the weights, stored with them.")
 @run_option("-q", "--quiet", is_flag=True, help="Say nothing but errors and where the weights are.")
-@data_option(
-    "--data",
-    metavar="people|CSV|FOLDER",
-    help="Synthetic people (default); a CSV of pairs from,to; a folder with pairs.csv, of clips"
-    " with their IUV, or of one person's photos.",
-)
-@data_option("--images", help="Folder that a CSV's names are relative to; else the CSV's.")
-@data_option("--people", type=int, help="How many; default 64, 0 for ever new ones.")
-@data_option("--people-cache", metavar="DIR", help="Folder that keeps them; default RUN/people.")
-@data_option("--skip-broken", is_flag=True, default=None, help="Leave out pairs with a problem.")
-@model_option("--preset", metavar="lite|paper", help="Sizes of the networks; default lite.")
-@model_option("--variant", metavar="NAME", help="full (default), no-int, ip, warp or warp-cond.")
-@model_option("--init", metavar="FILE", help="Weights to start from, for fine-tuning.")
-@loss_option(
-    "--perceptual",
-    metavar="NAME",
-    help="efficientnet-lite0 (default) or vgg19 (the paper's, from torchvision's cache).",
-)
-@loss_option("--vgg19", "vgg19_file", metavar="FILE", help="VGG-19's weights; chooses it as well.")
+@setting_options
 @loss_option("--no-perceptual", is_flag=True, help="Leave the perceptual loss out.")
-@loss_option("--sphereface", "sphereface_file", metavar="FILE", help="Weights for the face loss.")
 @loss_option("--no-identity", is_flag=True, help="Leave the face loss out; default with people.")
 @loss_option("--no-adversarial", is_flag=True, help="Leave the discriminator out.")
-@speed_option("--batch-size", type=int, help="Pairs at once on each device; default 4.")
 @speed_option(
     "--bf16/--fp32", "bf16", default=None, help="Default: bf16 where the hardware multiplies it."
 )
-@speed_option(
-    "--compile/--no-compile", "compile_networks", default=None, help="Compile; default: no."
-)
-@speed_option("--workers", type=int, help="Processes that read data; default: half of the cores.")
+@click.pass_context
 def train(
+    context: click.Context,
     output: Path | None,
     resume: Path | None,
     config: Path | None,
@@ -116,8 +86,13 @@ def train(
 
     A run that is stopped (Ctrl-C, SIGTERM) writes a checkpoint first. Several devices are started
     by `accelerate launch`.
+
+    `mt train iuv` trains the network that paints IUV.
     """
-    from motion_transfer.training.config_file import parse_assignment, read_settings, write_toml
+    if context.invoked_subcommand is not None:
+        if any(value not in (None, False, ()) for value in context.params.values()):
+            raise click.UsageError("Options of `mt train` mean nothing to `mt train iuv`.")
+        return
     from motion_transfer.training.runs import is_first_process, plan_new_run, plan_resumed_run
 
     if (output is None) == (resume is None):
@@ -129,43 +104,63 @@ def train(
     else:
         assert output is not None
         planned = plan_new_run(output, changes)
-    quiet_here = quiet or not is_first_process()
-    if not quiet_here:
+    leads = is_first_process()
+    quiet = quiet or not leads
+    if not quiet:
         click.echo(write_toml(planned.config), err=True)
-    progress = Progress(planned.config.run.steps, quiet=quiet_here)
-    trainer = _prepare(planned, progress, quiet=quiet_here)
-    with stop_on_signals() as stop:
-        result = trainer.train(lambda: stop.number is not None)
-    progress.close()
-    if is_first_process():
+    steps = planned.config.run.steps
+    with Progress(steps, quiet=quiet) as progress:
+        trainer = _prepare(planned, progress, quiet=quiet)
+        with stop_on_signals() as stop:
+            result = trainer.train(stop.asked)
+    if leads:
         click.echo(
             f"{result.weights}: {result.step} steps, {result.samples_per_second:.2f} samples/s,"
             f" {result.wait_share:.0%} of the time waiting for data"
         )
     if result.stopped:
-        if is_first_process():
-            click.echo(
-                f"mt: stopped at step {result.step} of {planned.config.run.steps}; go on with"
-                f" mt train --resume {planned.folder}",
-                err=True,
-            )
-        raise click.exceptions.Exit(128 + int(stop.number or signal.SIGINT))
+        stop.end(f"{result.step} of {steps}; go on with mt train --resume {planned.folder}", leads)
+
+
+def _settings_of(options: dict[str, Any]) -> dict[str, Any]:
+    """What was said on the command line, as settings."""
+    for loss, network in (("perceptual", "vgg19"), ("identity", "sphereface")):
+        given = [name for name in (loss, f"{network}_file") if options.get(name) is not None]
+        if options.pop(f"no_{loss}"):
+            if given:
+                name = given[0].removesuffix("_file")
+                raise InputError(f"--{name} and --no-{loss} contradict each other")
+            options[loss] = "none"
+        elif f"{network}_file" in given:
+            options[loss] = network
+    if options.pop("no_adversarial"):
+        options["adversarial"] = False
+    bf16 = options.pop("bf16")
+    if bf16 is not None:
+        options["precision"] = "bf16" if bf16 else "fp32"
+    keys = {
+        entry.name: f"{name}.{entry.name}" for name in SECTIONS for entry in fields(SECTIONS[name])
+    }
+    return {
+        keys[name]: check_value(keys[name], value)
+        for name, value in options.items()
+        if value is not None
+    }
 
 
 def _prepare(planned: Any, progress: Progress, *, quiet: bool) -> Any:
     """Read or make the data; stopped here, a run goes on with what is there already."""
-    from motion_transfer.people.extra import require_people
-    from motion_transfer.training.config import PEOPLE
+    from motion_transfer.extras import require_extra
     from motion_transfer.training.runs import prepare
 
     if planned.config.data.source == PEOPLE:
-        require_people()
+        require_extra("people")
         prepare_body_model(quiet)
     with (
         CountBar("photographing", unit="person", quiet=quiet) as people,
         CountBar("looking at the pairs", unit="picture", quiet=quiet) as pictures,
     ):
-        return prepare(planned, progress, photographed=people.advance, looked=pictures.advance)
+        return prepare(planned, progress, photographed=people.advance, checked=pictures.advance)
 
 
 class Progress:
@@ -175,12 +170,20 @@ class Progress:
         self._quiet, self._steps = quiet, steps
         self._bar: tqdm | None = None
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
     def __call__(self, event: Any) -> None:
-        from motion_transfer.training.events import Logged, Note
+        from motion_transfer.events import Notice
+        from motion_transfer.training.progress import Logged
 
         if self._quiet:
             return
-        if isinstance(event, Note):
+        if isinstance(event, Notice):
             tqdm.write(f"mt: note: {event.message}", file=sys.stderr)
         elif isinstance(event, Logged):
             terms = " ".join(f"{name} {value:.4f}" for name, value in event.terms.items())
@@ -194,21 +197,26 @@ class Progress:
             self._bar.set_postfix_str(f"{terms}; {rate}", refresh=False)
             self._bar.update(event.step - self._bar.n)
 
-    def close(self) -> None:
-        """Take the bar off the screen."""
-        if self._bar is not None:
-            self._bar.close()
-
 
 class Stop:
     """Which signal asked to stop, if one did."""
 
     number: int | None = None
 
+    def asked(self) -> bool:
+        """Tell whether one did."""
+        return self.number is not None
+
+    def end(self, where: str, aloud: bool) -> NoReturn:
+        """Leave the command as the signal would have, after saying where it stopped."""
+        if aloud:
+            click.echo(f"mt: stopped at step {where}", err=True)
+        raise click.exceptions.Exit(128 + int(self.number or signal.SIGINT))
+
 
 @contextmanager
 def stop_on_signals() -> Iterator[Stop]:
-    """The first Ctrl-C or SIGTERM lets the step end and be kept; the second stops at once."""
+    """Let the first Ctrl-C or SIGTERM end and keep the step; the second stops at once."""
     stop = Stop()
     before: dict[int, Any] = {}
 
@@ -227,37 +235,83 @@ def stop_on_signals() -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
-def _settings_of(options: dict[str, Any]) -> dict[str, Any]:
-    """What was said on the command line, as settings."""
-    from motion_transfer.training.config_file import check_value
-
-    if options.pop("no_perceptual"):
-        _refuse_both(options, "perceptual", "vgg19_file", but="--no-perceptual")
-        options["perceptual"] = "none"
-    if options.pop("no_identity"):
-        _refuse_both(options, "sphereface_file", but="--no-identity")
-        options["identity"] = "none"
-    if options.pop("no_adversarial"):
-        options["adversarial"] = False
-    settings = {}
-    for option, network, name in (
-        ("vgg19_file", "perceptual", "vgg19"),
-        ("sphereface_file", "identity", "sphereface"),
-    ):
-        file = options.pop(option)
-        if file is not None:
-            settings[f"losses.{option}"] = file
-            options[network] = name
-    bf16 = options.pop("bf16")
-    if bf16 is not None:
-        options["precision"] = "bf16" if bf16 else "fp32"
-    for option, value in options.items():
-        if value is not None:
-            settings[SETTINGS[option]] = check_value(SETTINGS[option], value)
-    return settings
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 
 
-def _refuse_both(options: dict[str, Any], *names: str, but: str) -> None:
-    for name in names:
-        if options[name] is not None:
-            raise InputError(f"--{name.removesuffix('_file')} and {but} contradict each other")
+@train.group()
+def iuv() -> None:
+    """Train the network that paints IUV from what BlazePose finds, on synthetic people.
+
+    \b
+    mt train iuv make data/ --people 2500
+    mt train iuv fit data/ run/ --steps 20000
+    mt train iuv make held-out/ --people 200 --split held-out
+    mt train iuv score held-out/ run/weights.safetensors
+    """
+
+
+@iuv.command()
+@click.argument("data", type=FILE)
+@click.option("--people", type=click.IntRange(1), required=True, help="How many, 4 photos each.")
+@click.option(
+    "--split",
+    type=click.Choice(["train", "held-out"]),
+    default="train",
+    help="train (default) or held-out: never the same people.",
+)
+@click.option("--workers", type=click.IntRange(1), help="Processes; default: one for each core.")
+@quiet_option
+def make(data: Path, quiet: bool, **options: Any) -> None:
+    """Photograph synthetic people, and find them with BlazePose; what is there stays."""
+    from motion_transfer.training.iuv.samples import SampleOptions, make_samples
+
+    settings = SampleOptions(out=data, **options)
+    prepare_body_model(quiet)
+    with CountBar("photographing", unit="person", total=settings.people, quiet=quiet) as bar:
+        added = make_samples(settings, bar.advance)
+    if not quiet:
+        click.echo(f"{data}: {added} of {settings.people} people added")
+
+
+@iuv.command()
+@click.argument("data", type=FILE)
+@click.argument("run", type=FILE)
+@click.option("--steps", type=click.IntRange(1), help="In all; default 20000.")
+@click.option("--batch-size", type=click.IntRange(1), help="People at once; default 16.")
+@click.option("--rate", "learning_rate", type=float, help="Highest learning rate; default 0.002.")
+@quiet_option
+def fit(data: Path, run: Path, quiet: bool, **options: Any) -> None:
+    """Train on samples; a run that was stopped goes on where it was."""
+    from motion_transfer.training.iuv.trainer import IuvTraining, TrainingSettings
+
+    given = {name: value for name, value in options.items() if value is not None}
+    training = IuvTraining(data, run, TrainingSettings(**given))
+    steps = training.settings.steps
+    with Progress(steps, quiet=quiet) as progress, stop_on_signals() as stop:
+        stopped = training.train(progress, stop.asked)
+    if stopped:
+        stop.end(f"{training.step} of {steps}; the same command goes on", not quiet)
+    click.echo(f"{run}/weights.safetensors: {training.step} steps")
+
+
+@iuv.command()
+@click.argument("data", type=FILE)
+@click.argument("weights", type=FILE)
+def score(data: Path, weights: Path) -> None:
+    """Compare the IUV that weights paint with the exact one."""
+    import numpy as np
+
+    from motion_transfer.estimate.iuv.network import load_weights
+    from motion_transfer.training.iuv.samples import list_samples
+    from motion_transfer.training.iuv.trainer import IuvScore, score_samples
+
+    files, network = list_samples(data), load_weights(weights)
+    scores = []
+    with CountBar("scoring", unit="photo", total=len(files), quiet=False) as bar:
+        for each in score_samples(files, network):
+            scores.append(each)
+            bar.advance(1)
+    for entry in fields(IuvScore):
+        values = [getattr(each, entry.name) for each in scores]
+        worst = np.nanquantile(values, [0.1, 0.9]).round(3)
+        click.echo(f"{entry.name:15} mean {np.nanmean(values):.3f}  worst tenth {worst}")

@@ -1,32 +1,40 @@
-"""A clip of raw pictures as IUV, frame after frame.
+"""A clip of raw pictures as IUV, frame after frame, one person or several in each.
 
 Decoding, estimating and what becomes of the frames run in a thread each, a few frames apart.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass, field
-from itertools import islice
-from typing import Literal
+from itertools import combinations, islice
+from typing import Literal, TypeVar
 
+import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.drawing.person import EVERYBODY, Box, Follower
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.choice import EVERYBODY, Follower
 from motion_transfer.estimate.interface import Estimator, Landmarks, PersonEstimate
 from motion_transfer.estimate.shots import mark_shots
-from motion_transfer.estimate.together import lay_alpha, lay_together
-from motion_transfer.media.ahead import read_ahead
-from motion_transfer.media.picture_stream import PictureStream
+from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.repair.gaps import fill_gaps
 
-AHEAD_FRAMES = 4
-MissingPeople = Literal["hold", "background", "fail"]
+AHEAD_FRAMES = 4  # a few, so that a slow frame of one thread does not stop the others
 
+POLL_SECONDS = 0.05  # waiting without end would not hear Ctrl-C everywhere
+END = object()
+
+NOBODY = 255  # higher than anybody's number, so that the lowest number around a pixel is a person
+MOST_PEOPLE = NOBODY - 1  # in a frame; those after them are left out
+
+MissingPeople = Literal["hold", "background", "fail"]
 Frame = UInt8[np.ndarray, "H W C"]
+T = TypeVar("T")
 
 
 @dataclass
@@ -34,9 +42,9 @@ class ClipSummary:
     """What was seen, as far as the clip was read.
 
     Attributes:
-        shots: the frames with which shots begin.
-        empty: half-open ranges of frames in which nobody was found.
-        most_people: in one frame.
+        shots: The frames with which shots begin.
+        empty: Half-open ranges of frames in which nobody was found.
+        most_people: How many were found in one frame, at most.
     """
 
     frame_count: int = 0
@@ -53,12 +61,10 @@ class ClipSummary:
         index = self.frame_count
         self.frame_count += 1
         self.most_people = max(self.most_people, people)
-        if people:
-            return
-        if self.empty and self.empty[-1][1] == index:
-            self.empty[-1] = (self.empty[-1][0], index + 1)
-        else:
-            self.empty.append((index, index + 1))
+        if not people:
+            goes_on = bool(self.empty) and self.empty[-1][1] == index
+            start = self.empty.pop()[0] if goes_on else index
+            self.empty.append((start, index + 1))
 
 
 def estimate_clip(
@@ -71,15 +77,15 @@ def estimate_clip(
     summary: ClipSummary | None = None,
     with_alpha: bool = False,
 ) -> Generator[Frame, None, None]:
-    """The IUV of every frame, H x W x 3 uint8, (I, U, V).
+    """Estimate the IUV of every frame, H x W x 3 uint8, (I, U, V).
 
     Args:
         person: `all`, `largest`, an index from the left, or a box; see `Follower`.
-        missing: what a frame without anybody shows: the frame before (`hold`; at the start, the
+        missing: What a frame without anybody shows: the frame before (`hold`; at the start, the
             first one with somebody), `background`, or it is an error (`fail`).
-        chosen: the frames that are wanted: those before are shown empty, those behind are not read.
-        summary: filled as frames are read; of the chosen ones.
-        with_alpha: a fourth channel says how much of each pixel is a person, 0..255.
+        chosen: The frames that are wanted: those before are shown empty, those behind are not read.
+        summary: Filled as frames are read; tells of the chosen ones.
+        with_alpha: Whether a fourth channel says how much of each pixel is a person, 0..255.
     Raises: InputError if nobody is found in any frame, or in one where `fail` forbids it, or for a
         frame that is broken.
     """
@@ -102,11 +108,11 @@ def follow_landmarks(
     count: int,
     done: Callable[[int], object] = int,
 ) -> list[Landmarks]:
-    """The landmarks of one person in the first `count` of the chosen frames that have them.
+    """Find the landmarks of one person in the first `count` of the chosen frames that have them.
 
     Args:
-        person: as `estimate_clip`'s, but for `all`.
-        done: called with 1 after each frame.
+        person: As that of `estimate_clip`, but for `all`.
+        done: Called with 1 after each frame.
     Raises: InputError if nobody is found in any of them, or for a frame that is broken.
     """
     found: list[Landmarks] = []
@@ -122,12 +128,46 @@ def follow_landmarks(
     return found
 
 
-def _nobody(pictures: PictureStream, frame_count: int) -> InputError:
-    what = pictures.path if frame_count == 1 else f"any frame of {pictures.path}"
-    return InputError(
-        f"nobody was found in {what}; it should show a person, upright and larger than about"
-        " 60 pixels, whose IUV can otherwise be made by DensePose"
-    )
+def lay_iuv(
+    people: Sequence[PersonEstimate], height: int, width: int
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Lay the people of a frame in one IUV image, and still apart.
+
+    A pixel that several claim goes to the one whose alpha is higher there: where somebody is
+    covered, its mask ends. An image of (I, U, V) does not say whose a pixel is, and connected
+    pixels are taken for one person's; so between people who touch, one pixel of background stays.
+    """
+    iuv = np.zeros((height, width, 3), np.uint8)
+    owner = np.full((height, width), NOBODY, np.uint8)
+    claim = np.full((height, width), -1, np.int16)  # below alpha 0, which may be a body, too
+    people = people[:MOST_PEOPLE]
+    for number, person in enumerate(people):
+        place = person.box.slices
+        wins = (person.iuv[..., 0] > 0) & (person.alpha > claim[place])
+        # not by `[wins]`: of a large photo its list of indices takes more memory than the photo
+        np.copyto(iuv[place], person.iuv, where=wins[..., None])
+        np.copyto(claim[place], person.alpha, where=wins)
+        np.copyto(owner[place], number, where=wins)
+    if any(_touch(a.box, b.box) for a, b in combinations(people, 2)):
+        nearby = cv2.erode(owner, np.ones((3, 3), np.uint8))  # the lowest number around
+        iuv *= (nearby == owner)[..., None]
+    return iuv
+
+
+def lay_alpha(
+    people: Sequence[PersonEstimate], height: int, width: int
+) -> UInt8[np.ndarray, "H W"]:
+    """Tell how much of each pixel is anybody, 0..255; where several are, the most certain's."""
+    alpha = np.zeros((height, width), np.uint8)
+    for person in people:
+        place = person.box.slices
+        np.maximum(alpha[place], person.alpha, out=alpha[place])
+    return alpha
+
+
+def _touch(one: Box, other: Box) -> bool:
+    across = one.left <= other.right and other.left <= one.right
+    return across and one.top <= other.bottom and other.top <= one.bottom
 
 
 @dataclass(frozen=True)
@@ -151,6 +191,7 @@ def _follow(
             if index < chosen.start:
                 yield _Seen(index, picture, False, False, [])
                 continue
+            # the first frame that is looked at has no past, wherever its shot began
             begins = begins or index == chosen.start
             if begins:
                 estimator.start_shot()
@@ -179,7 +220,40 @@ def _draw(
                         f"{pictures.where(seen.index)}: nobody found; cut the clip there, or choose"
                         " --missing hold or --missing background"
                     )
-            iuv = lay_together(seen.people, height, width)
-            if with_alpha:
-                iuv = np.dstack([iuv, lay_alpha(seen.people, height, width)])
-            yield iuv
+            iuv = lay_iuv(seen.people, height, width)
+            yield np.dstack([iuv, lay_alpha(seen.people, height, width)]) if with_alpha else iuv
+
+
+def _nobody(pictures: PictureStream, frame_count: int) -> InputError:
+    what = pictures.path if frame_count == 1 else f"any frame of {pictures.path}"
+    return InputError(
+        f"nobody was found in {what}; it should show a person, upright and larger than about"
+        " 60 pixels, whose IUV can otherwise be made by DensePose"
+    )
+
+
+def read_ahead(items: Iterable[T], count: int) -> Generator[T, None, None]:
+    """Make the items, in order, in a thread of their own; at most `count` wait.
+
+    Close the generator (`contextlib.closing`) where it may not be read to its end: that ends the
+    thread, and closes `items` there if that is a generator.
+
+    Raises: Whatever making an item raises, in its place.
+    """
+    iterator = iter(items)
+    with ThreadPoolExecutor(1) as thread:
+        coming = deque(thread.submit(next, iterator, END) for _ in range(count))
+        try:
+            while True:
+                while not coming[0].done():
+                    wait([coming[0]], POLL_SECONDS)
+                item = coming.popleft().result()
+                if item is END:
+                    return
+                coming.append(thread.submit(next, iterator, END))
+                yield item  # pyright: ignore[reportReturnType]
+        finally:
+            for future in coming:
+                future.cancel()
+            if isinstance(items, Generator):
+                thread.submit(items.close)

@@ -25,33 +25,35 @@ import torch.nn.functional as F
 from jaxtyping import UInt8
 from torch import Tensor
 
+from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError, WeightsError
-from motion_transfer.estimate.interface import Box, PersonEstimate
+from motion_transfer.estimate.interface import PersonEstimate, check_frame
+from motion_transfer.estimate.models import digest
 from nhrr_core.iuv import PART_COUNT
 
-LOWEST_SCORE = 0.8
-"""detectron2's own default where it draws people."""
+LOWEST_SCORE = 0.8  # detectron2's own default where it draws people
+SAME_PERSON_OVERLAP = 0.3  # with a box of the frame before; less is somebody else
 
-SAME_PERSON_OVERLAP = 0.3
-OUTPUTS = (
-    "pred_boxes",
-    "scores",
-    "pred_densepose_coarse_segm",
-    "pred_densepose_fine_segm",
-    "pred_densepose_u",
-    "pred_densepose_v",
-)
+OUTPUTS = {
+    "pred_boxes": (2, None),
+    "scores": (1, None),
+    "pred_densepose_coarse_segm": (4, None),  # 2 or 15: all but the first are body
+    "pred_densepose_fine_segm": (4, PART_COUNT + 1),
+    "pred_densepose_u": (4, PART_COUNT + 1),
+    "pred_densepose_v": (4, PART_COUNT + 1),
+}
+"""How many dimensions each has, and how many channels where that matters."""
 
 Picture = UInt8[np.ndarray, "H W 3"]
 Outputs = dict[str, Tensor]
 
 
 class DensePoseEstimator:
-    """Frames to people, by a DensePose model; one object serves one thread.
+    """What turns frames into people with a DensePose model; one object serves one thread.
 
     Args:
         model: `.onnx`, or TorchScript with any other ending (`.pt`, `.pth`, `.torchscript`).
-        lowest_score: people scored less are left out, 0..1.
+        lowest_score: People scored less are left out, 0..1.
     Raises: WeightsError if the file is missing, is no such model, or a package to run it is;
         InputError for an impossible score.
     """
@@ -72,17 +74,14 @@ class DensePoseEstimator:
         self._tracks = 0
 
     def estimate(self, frame: Picture) -> list[PersonEstimate]:
-        """The people of the next frame, the most confident first; maybe nobody.
+        """Find the people of the next frame, the most confident first; maybe nobody.
 
         `alpha` is DensePose's coarse segmentation: clothes mostly, hair partly.
 
         Raises: InputError if the frame is no RGB picture; WeightsError if the model fails on it or
             gives something else than promised.
         """
-        if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8 or not frame.size:
-            raise InputError(
-                f"a frame of shape {frame.shape} and type {frame.dtype}; RGB is needed"
-            )
+        check_frame(frame)
         try:
             outputs = self._predict(np.ascontiguousarray(frame[..., ::-1]))
         except (RuntimeError, ValueError, TypeError) as error:
@@ -100,12 +99,13 @@ class DensePoseEstimator:
             box, iuv, alpha = found
             track = self._follow(box, {number for number, _ in seen})
             seen.append((track, box))
+            # a foreign model's scores are not promised to end at 1
             people.append(PersonEstimate(track, box, iuv, alpha, min(1.0, score), None))
         self._last = seen
         return people
 
     def _follow(self, box: Box, taken: set[int]) -> int:
-        """The number of the person of the last frame whose box this is, or a new one."""
+        """Number the person of the last frame whose box this is, or a new one."""
         free = [(box.overlap(last), number) for number, last in self._last if number not in taken]
         overlap, number = max(free, default=(0.0, -1))
         if overlap >= SAME_PERSON_OVERLAP:
@@ -114,27 +114,32 @@ class DensePoseEstimator:
         return self._tracks - 1
 
     def _check(self, outputs: Any) -> None:
-        missing = [name for name in OUTPUTS if name not in outputs]
-        if missing:
+        if missing := [name for name in OUTPUTS if name not in outputs]:
             raise WeightsError(
                 f"DensePose model {self._path} gives no {', '.join(missing)}; export a chart-based"
                 " (IUV) model with DensePose-TorchScript"
             )
         people = len(outputs["scores"])
-        for name in OUTPUTS:
+        for name, (dimensions, channels) in OUTPUTS.items():
             shape = list(outputs[name].shape)
-            channels = PART_COUNT + 1 if name[-1] in "uv" or "fine" in name else None
-            expected = {"pred_boxes": 2, "scores": 1}.get(name, 4)
-            wrong = len(shape) != expected or shape[0] != people
-            if wrong or (channels is not None and shape[1] != channels):
+            wrong = len(shape) != dimensions or shape[0] != people
+            if wrong or (channels and shape[1] != channels):
                 raise WeightsError(
                     f"DensePose model {self._path} gives {name} as {shape} for {people} people"
                     + (f"; N x {channels} x h x w is expected" if channels else "")
                 )
 
 
+def model_facts(model: Path) -> dict[str, Any]:
+    """Tell what decides the answers, for keys of content: the file. Raises: InputError."""
+    try:
+        return {"model": digest(model.read_bytes())}
+    except OSError as error:
+        raise InputError(f"DensePose model {model} cannot be read: {error.strerror}") from error
+
+
 def _open_script(path: Path) -> Callable[[Picture], Outputs]:
-    """A TorchScript model as a function. It runs code of the file."""
+    """Open a TorchScript model as a function. It runs code of the file."""
     with suppress(ImportError):
         import_module("torchvision")  # exports use its operators: nms, roi_align
     device = "cuda" if torch.cuda.is_available() else "cpu"
@@ -161,7 +166,7 @@ def _open_script(path: Path) -> Callable[[Picture], Outputs]:
 
 
 def _open_onnx(path: Path) -> Callable[[Picture], Outputs]:
-    """An ONNX model as a function."""
+    """Open an ONNX model as a function."""
     try:
         runtime = import_module("onnxruntime")
     except ImportError:
@@ -173,6 +178,7 @@ def _open_onnx(path: Path) -> Callable[[Picture], Outputs]:
     except Exception as error:  # its errors have no common base
         raise WeightsError(f"DensePose model {path} is not a readable ONNX file") from error
     (entry, *_), names = session.get_inputs(), [output.name for output in session.get_outputs()]
+    # conversions differ in the picture's type and in where its channels lie
     kind = np.uint8 if entry.type == "tensor(uint8)" else np.float32
     channels_first = list(entry.shape)[:1] == [3]
 
@@ -191,7 +197,7 @@ def _open_onnx(path: Path) -> Callable[[Picture], Outputs]:
 def _paint(
     outputs: Outputs, index: int, height: int, width: int
 ) -> tuple[Box, UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]] | None:
-    """Box, IUV and alpha of one person; None if the box lies outside the frame."""
+    """Paint box, IUV and alpha of one person; None if the box lies outside the frame."""
     x0, y0, x1, y1 = outputs["pred_boxes"][index].tolist()
     left, top = int(x0), int(y0)
     size = max(1, int(y1 - y0)), max(1, int(x1 - x0))
@@ -200,8 +206,9 @@ def _paint(
         return None
     coarse, fine, u, v = (
         F.interpolate(outputs[name][index][None], size, mode="bilinear", align_corners=False)[0]
-        for name in OUTPUTS[2:]
+        for name in list(OUTPUTS)[2:]
     )
+    # the coarse segmentation says where a body is, the fine one which part it is there
     part = fine.argmax(0) * (coarse.argmax(0) > 0)
     places = torch.stack([chart.gather(0, part[None])[0] for chart in (u, v)], -1)
     levels = (places.clamp(0, 1) * 255).round() * (part > 0)[..., None]

@@ -2,7 +2,7 @@
 
 Convention: pixel centres lie at +0.5, x to the right, y down. Left and right are the person's own.
 Arrays of one person cover only that person's box, so that memory follows the people and not the
-frame; `on_frame` puts them back.
+frame; `PersonEstimate.on_frame` puts them back.
 """
 
 from __future__ import annotations
@@ -13,59 +13,32 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float32, UInt8
 
+from motion_transfer.drawing.person import Box
+from motion_transfer.errors import InputError
+
+SIDES = ("left", "right")
+_PAIRED = (
+    *("shoulder", "elbow", "wrist", "pinky", "index", "thumb"),
+    *("hip", "knee", "ankle", "heel", "foot-index"),
+)
 LANDMARK_NAMES = (
     "nose",
-    *(
-        f"{side}-eye-{place}"
-        for side in ("left", "right")
-        for place in ("inner", "middle", "outer")
-    ),
+    *(f"{side}-eye-{place}" for side in SIDES for place in ("inner", "middle", "outer")),
     *("left-ear", "right-ear", "mouth-left", "mouth-right"),
-    *(
-        f"{side}-{joint}"
-        for joint in ("shoulder", "elbow", "wrist", "pinky", "index", "thumb")
-        for side in ("left", "right")
-    ),
-    *(
-        f"{side}-{joint}"
-        for joint in ("hip", "knee", "ankle", "heel", "foot-index")
-        for side in ("left", "right")
-    ),
+    *(f"{side}-{joint}" for joint in _PAIRED for side in SIDES),
 )
 """BlazePose's 33, in its order (Bazarevsky et al., BlazePose, 2020)."""
 
 LANDMARK_COUNT = len(LANDMARK_NAMES)
 LANDMARK = {name: index for index, name in enumerate(LANDMARK_NAMES)}
 
+Bone = tuple[tuple[str, ...], tuple[str, ...]]
+"""A line from the middle of some landmarks to the middle of others."""
 
-@dataclass(frozen=True)
-class Box:
-    """Whole pixels of a frame: columns left..right, rows top..bottom, the ends not included."""
 
-    left: int
-    top: int
-    right: int
-    bottom: int
-
-    @property
-    def width(self) -> int:
-        return self.right - self.left
-
-    @property
-    def height(self) -> int:
-        return self.bottom - self.top
-
-    @property
-    def slices(self) -> tuple[slice, slice]:
-        """Rows and columns, to index an array with."""
-        return slice(self.top, self.bottom), slice(self.left, self.right)
-
-    def overlap(self, other: Box) -> float:
-        """Intersection over union, 0..1."""
-        width = min(self.right, other.right) - max(self.left, other.left)
-        height = min(self.bottom, other.bottom) - max(self.top, other.top)
-        shared = max(width, 0) * max(height, 0)
-        return shared / max(1, self.width * self.height + other.width * other.height - shared)
+def both_sides(*ends: tuple[str, str]) -> tuple[Bone, ...]:
+    """List the bones between joints that both sides of a body have, the left ones first."""
+    return tuple(((f"{side}-{a}",), (f"{side}-{b}",)) for side in SIDES for a, b in ends)
 
 
 @dataclass(frozen=True)
@@ -73,11 +46,11 @@ class Landmarks:
     """Points of one person, 33 in the order of `LANDMARK_NAMES`.
 
     Attributes:
-        image: x and y in frame pixels, and depth in the same unit, 0 at the middle of the hips and
+        image: X and y in frame pixels, and depth in the same unit, 0 at the middle of the hips and
             smaller nearer to the camera. Points may lie outside the frame.
-        world: metres from the middle of the hips; x to the right of the picture, y down, z away.
-        visibility: chance that the point is in the picture and nothing covers it, 0..1.
-        presence: chance that the point is in the picture, 0..1.
+        world: Metres from the middle of the hips; x to the right of the picture, y down, z away.
+        visibility: Chance that the point is in the picture and nothing covers it, 0..1.
+        presence: Chance that the point is in the picture, 0..1.
     """
 
     image: Float32[np.ndarray, "33 3"]
@@ -91,11 +64,11 @@ class PersonEstimate:
     """One person of a frame.
 
     Attributes:
-        track: the same number for the same person in all frames of a shot.
-        box: where `iuv` and `alpha` lie.
+        track: The same number for the same person in all frames of a shot.
+        box: Where `iuv` and `alpha` lie.
         iuv: (I, U, V) of the body without clothes or hair; 0 where it is not.
-        alpha: how much of each pixel is this person, with clothes and hair, 0..255.
-        confidence: that a person is there, 0..1.
+        alpha: How much of each pixel is this person, with clothes and hair, 0..255.
+        confidence: Chance that a person is there, 0..1.
         landmarks: None where the estimator has none.
     """
 
@@ -106,10 +79,15 @@ class PersonEstimate:
     confidence: float
     landmarks: Landmarks | None
 
+    @property
+    def pixels(self) -> int:
+        """How many pixels of the frame are this person's body."""
+        return int(np.count_nonzero(self.iuv[..., 0]))
+
     def on_frame(
         self, height: int, width: int
     ) -> tuple[UInt8[np.ndarray, "H W 3"], UInt8[np.ndarray, "H W"]]:
-        """IUV and alpha on a whole frame of that size, 0 around the box."""
+        """Put IUV and alpha on a whole frame of that size, 0 around the box."""
         iuv = np.zeros((height, width, 3), np.uint8)
         alpha = np.zeros((height, width), np.uint8)
         iuv[self.box.slices], alpha[self.box.slices] = self.iuv, self.alpha
@@ -117,12 +95,20 @@ class PersonEstimate:
 
 
 class Estimator(Protocol):
-    """Frames to people."""
+    """What turns frames into people, one frame of a shot after the other."""
 
     def estimate(self, frame: UInt8[np.ndarray, "H W 3"]) -> list[PersonEstimate]:
-        """The people of the next frame of a shot, the most confident first; maybe nobody."""
+        """Find the people of the next frame of a shot, the most confident first; maybe nobody."""
         ...
 
     def start_shot(self) -> None:
         """Forget who was where: the next frame has nothing to do with the last one."""
-        ...
+
+
+def check_frame(frame: np.ndarray) -> None:
+    """Raise InputError unless a frame is an RGB picture."""
+    if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8 or not frame.size:
+        raise InputError(
+            f"a frame of shape {frame.shape} and type {frame.dtype}; RGB of 8 bits (H x W x 3)"
+            " is needed"
+        )

@@ -1,37 +1,87 @@
-"""Which estimator: by name, ready to work, and known again by its content."""
+"""Which estimators there are: a table, light to import, and what opens one of them by name.
+
+A new estimator is one module and one row here. What a row names is loaded when it is needed, so
+that options can be described and checked without the libraries that do the work.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
-from importlib.resources import files
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.interface import Estimator
-from motion_transfer.estimate.model_files import MODEL_FILES, digest
 from motion_transfer.version import __version__
 
 if TYPE_CHECKING:
-    from motion_transfer.estimate.proportions import BodyFit
+    from motion_transfer.estimate.blazepose.retarget import BodyFit
+    from motion_transfer.estimate.interface import Estimator
 
-ESTIMATORS = ("blazepose", "densepose")
 DEFAULT_RATE = Fraction(30)
 
 
-def check_estimator(name: str, model: Path | None) -> None:
-    """Raises: InputError for an unknown estimator, or a model too many or too few."""
+@dataclass(frozen=True)
+class EstimatorEntry:
+    """One way to find people in raw pictures.
+
+    Attributes:
+        home: The module and the class in it. The module also has `model_facts(model)`, which tells
+            what decides the answers, for keys of content.
+        takes: What the class is made with; `fit` only if it gives landmarks.
+        model_kind: What kind of file `model` has to be; empty where the estimator brings its own.
+    """
+
+    home: tuple[str, str]
+    takes: tuple[str, ...]
+    model_kind: str = ""
+
+
+ESTIMATORS = {
+    "blazepose": EstimatorEntry(
+        ("motion_transfer.estimate.blazepose", "BlazePoseEstimator"),
+        takes=("frame_rate", "threads", "fit"),
+    ),
+    "densepose": EstimatorEntry(
+        ("motion_transfer.estimate.densepose", "DensePoseEstimator"),
+        takes=("model",),
+        model_kind="a TorchScript or ONNX file, such as those of DensePose-TorchScript",
+    ),
+}
+
+
+def check_estimator(
+    name: str, model: Path | None, *, fit: bool = False, model_flag: str = ""
+) -> None:
+    """Check that there is such an estimator, and that it gets what it uses and nothing else.
+
+    Args:
+        fit: Whether people get other proportions.
+        model_flag: The option that gives the model; messages then speak of options.
+    Raises: InputError for an unknown estimator, a model too many or too few, or a fit of what has
+        no landmarks.
+    """
     if name not in ESTIMATORS:
         raise InputError(f"estimator {name!r}; supported are {', '.join(ESTIMATORS)}")
-    if name == "densepose" and model is None:
+    kind = ESTIMATORS[name].model_kind
+    if kind and model is None:
+        lacking = f"{model_flag} FILE; none ships" if model_flag else f"its model: {kind}; name it"
+        raise InputError(f"the {name} estimator needs {lacking}")
+    if model is not None and not kind:
+        other = _names_of("model")
         raise InputError(
-            "the densepose estimator needs its model: a TorchScript or ONNX file, such as those of"
-            " DensePose-TorchScript; name it"
+            f"{model_flag} is for the {other} estimator; add --estimator {other}"
+            if model_flag
+            else f"the {name} estimator has its own models and does not use {model}; leave it out,"
+            f" or choose the {other} estimator"
         )
-    if name == "blazepose" and model is not None:
+    if fit and "fit" not in ESTIMATORS[name].takes:
         raise InputError(
-            f"the blazepose estimator has its own models and does not use {model}; leave it out, or"
-            " choose the densepose estimator"
+            f"--fit-body compares landmarks, and the {name} estimator gives none; choose the"
+            f" {_names_of('fit')} estimator, or leave out --fit-body"
+            if model_flag
+            else f"the {name} estimator gives no landmarks, so no body can be fitted"
         )
 
 
@@ -43,44 +93,30 @@ def open_estimator(
     threads: int = 1,
     fit: BodyFit | None = None,
 ) -> Estimator:
-    """An estimator ready for a clip.
+    """Open an estimator, ready for a clip.
 
     Args:
-        model: DensePose's file.
-        frame_rate: of the clip, for smoothing; None: 30.
-        threads: of BlazePose's networks.
-        fit: other proportions for everybody; blazepose only.
-    Raises: InputError for a fit of what has no landmarks; InputError and WeightsError where a model
-        or a package is missing, saying how to get it.
+        model: The user's file, for an estimator that runs one.
+        frame_rate: The clip's, for smoothing; None means 30.
+        threads: Of each of the estimator's own networks.
+        fit: Other proportions for everybody.
+    Raises: InputError as `check_estimator`; InputError and WeightsError where a model or a package
+        is missing, saying how to get it.
     """
-    check_estimator(name, model)
-    if fit is not None and name != "blazepose":
-        raise InputError(f"the {name} estimator gives no landmarks, so no body can be fitted")
-    if name == "densepose" and model is not None:
-        from motion_transfer.estimate.densepose import DensePoseEstimator
-
-        return DensePoseEstimator(model)
-    from motion_transfer.estimate.blazepose import BlazePoseEstimator
-
+    check_estimator(name, model, fit=fit is not None)
     rate = float(frame_rate or DEFAULT_RATE)
-    return BlazePoseEstimator(frame_rate=rate, threads=threads, fit=fit)
+    given = {"model": model, "frame_rate": rate, "threads": threads, "fit": fit}
+    module, estimator = ESTIMATORS[name].home
+    takes = {what: given[what] for what in ESTIMATORS[name].takes}
+    return getattr(import_module(module), estimator)(**takes)
 
 
 def estimator_facts(name: str, model: Path | None) -> dict[str, Any]:
-    """What decides an estimator's answers, for keys of content. Raises: InputError."""
+    """Tell what decides an estimator's answers, for keys of content. Raises: InputError."""
     check_estimator(name, model)
-    if model is not None:
-        try:
-            content = digest(model.read_bytes())
-        except OSError as error:
-            raise InputError(f"DensePose model {model} cannot be read: {error.strerror}") from error
-        return {"estimator": name, "model": content, "version": __version__}
-    from motion_transfer.estimate.iuv_weights import SHIPPED
+    facts = import_module(ESTIMATORS[name].home[0]).model_facts(model)
+    return {"estimator": name, "version": __version__, **facts}
 
-    network = files("motion_transfer.estimate").joinpath(SHIPPED)
-    return {
-        "estimator": name,
-        "models": [file.sha256 for file in MODEL_FILES],
-        "network": digest(network.read_bytes()) if network.is_file() else None,
-        "version": __version__,
-    }
+
+def _names_of(what: str) -> str:
+    return " or ".join(name for name, entry in ESTIMATORS.items() if what in entry.takes)

@@ -9,19 +9,14 @@ from fractions import Fraction
 from pathlib import Path
 from typing import get_args
 
+from motion_transfer.drawing.person import EVERYBODY, Follower
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.choice import EVERYBODY, Follower
 from motion_transfer.estimate.clip import ClipSummary, MissingPeople, estimate_clip
 from motion_transfer.estimate.interface import Estimator
 from motion_transfer.estimate.opening import check_estimator, open_estimator
-from motion_transfer.media.iuv_image import ChannelOrder
-from motion_transfer.media.iuv_writing import (
-    VIDEO_RATE,
-    IuvFormat,
-    check_iuv_output,
-    write_iuv,
-)
-from motion_transfer.media.picture_stream import open_pictures
+from motion_transfer.media.iuv.formats import ChannelOrder
+from motion_transfer.media.iuv.writing import VIDEO_RATE, IuvOutput, check_iuv_output, write_iuv
+from motion_transfer.media.pictures.formats import open_pictures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,14 +24,14 @@ class EstimateOptions:
     """What to look at, and what to write.
 
     Attributes:
-        source: a photo, a folder of photos, or a video.
-        output: a folder of PNG, `.mkv`, `.npy`, or `.png` for one frame.
-        model: of the `densepose` estimator.
+        source: A photo, a folder of photos, or a video.
+        output: A folder of PNG, `.mkv`, `.npy`, or `.png` for one frame.
+        model: The file of the `densepose` estimator.
         person: `all`, `largest`, an index from the left, or a box `x0,y0,x1,y1` in px.
-        missing: what frames show in which nobody is found; see `estimate_clip`.
-        output_order: the channel order to write, for pictures and video.
-        frame_rate: of a video; None: the source's, or 30.
-        alpha: write the people's alpha beside the IUV, see `name_alpha`.
+        missing: What frames show in which nobody is found; see `estimate_clip`.
+        output_order: The channel order to write, for pictures and video.
+        frame_rate: A video's; None means the source's, or 30.
+        alpha: Whether to write the people's alpha beside the IUV, see `name_alpha`.
     """
 
     source: Path
@@ -51,12 +46,11 @@ class EstimateOptions:
     alpha: bool = False
 
     def __post_init__(self) -> None:
-        if self.missing not in get_args(MissingPeople):
-            raise InputError(
-                f"missing {self.missing!r}; supported are {', '.join(get_args(MissingPeople))}"
-            )
+        supported = get_args(MissingPeople)
+        if self.missing not in supported:
+            raise InputError(f"missing {self.missing!r}; supported are {', '.join(supported)}")
         check_estimator(self.estimator, self.model)
-        Follower(self.person)
+        Follower(self.person)  # refuses what is no choice, before anything is opened
 
 
 @dataclass(frozen=True)
@@ -77,13 +71,13 @@ def estimate_iuv(
     """Write the IUV of raw pictures of any length.
 
     Args:
-        done: called with 1 and the number of all frames after each frame.
-        estimator: one that is ready; None: the one that the options name.
+        done: Called with 1 and the number of all frames after each frame.
+        estimator: One that is ready; None opens the one that the options name.
     Raises: InputError and its kinds; nothing half-written stays behind.
     """
     pictures = open_pictures(options.source)
     rate = options.frame_rate or pictures.frame_rate
-    settings = IuvFormat(
+    settings = IuvOutput(
         frame_count=pictures.frame_count,
         height=pictures.height,
         width=pictures.width,
@@ -92,9 +86,11 @@ def estimate_iuv(
         force=options.force,
         alpha=options.alpha,
     )
+    # before the estimator, which takes seconds to load
     check_iuv_output(options.output, settings)
-    if estimator is None:
-        estimator = open_estimator(options.estimator, options.model, frame_rate=pictures.frame_rate)
+    estimator = estimator or open_estimator(
+        options.estimator, options.model, frame_rate=pictures.frame_rate
+    )
     summary = ClipSummary()
     frames = estimate_clip(
         pictures,

@@ -1,1 +1,1 @@
-"""Evaluation on equal terms: the same pairs, the same framing, the same numbers for all."""
+"""Evaluation on equal terms: the same pairs, the same framing, the same numbers for all methods."""

@@ -1,32 +1,41 @@
-"""The methods that are compared: a renderer of ours with some weights, or pictures of another's."""
+"""The methods that are compared: renderers, folders of other methods' pictures, the real frames."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+import re
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
-import cv2
-import numpy as np
-from jaxtyping import UInt8
-
+from motion_transfer.drawing.canvas import Canvas, make_background
+from motion_transfer.drawing.person import bounding_box
+from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
+from motion_transfer.drawing.source import Source, SourcePicture, unfold_source
+from motion_transfer.drawing.window import plan_window
 from motion_transfer.errors import InputError
-from motion_transfer.evaluation.results_folder import ResultsFolder
-from motion_transfer.media.work import digest_of
-from motion_transfer.render.compose import make_background, paste
-from motion_transfer.render.outline import clearance_of
-from motion_transfer.render.person import Person, occupancy
-from motion_transfer.render.renderer import Renderer
-from motion_transfer.render.source import Source, unfold
-from motion_transfer.render.window import plan_window
-from motion_transfer.training.pairs import Pair
+from motion_transfer.evaluation.framing import Framing, Image
+from motion_transfer.evaluation.options import EvaluationOptions
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES
+from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.training.pairs import Pair, flat_stem
 from motion_transfer.training.pictures import PersonPicture
-from nhrr_core.iuv import ALL_PARTS
+from motion_transfer.weights import find_weights
 
-Image = UInt8[np.ndarray, "H W 3"]
+PATTERNS = (
+    "SOURCE__TARGET",
+    "SOURCE___TARGET",
+    "SOURCE___TARGET_vis",
+    "SOURCE_2_TARGET",
+    "SOURCE_2_TARGET_vis",
+    "SOURCE.jpg___TARGET.jpg",
+    "SOURCE.jpg___TARGET.jpg_vis",
+)
+"""How results are named, without their ending: as this program does, then as the published code of
+Siarohin et al., Zhu et al. (PATN) and Ren et al. (GFLA). Where a name held folders, `-` joins them;
+the last two keep the ending of each picture in the pair list."""
+
 Draw = Callable[[Pair, PersonPicture], Image]
-
-TEXTURE_TEXELS = 256
+"""Draws one source in a target's pose, as large as the target or of its aspect."""
 
 
 class OpenedSource:
@@ -34,16 +43,14 @@ class OpenedSource:
 
     def __init__(self, picture: PersonPicture) -> None:
         self.picture = picture
-        self._photo = picture.as_photo()
         self._prepared: dict[int, Source] = {}
 
     def prepare(self, texels: int) -> Source:
-        """What renderers start from, with a texture of `texels` x `texels`."""
+        """Prepare what renderers start from, with a texture of `texels` x `texels`."""
         if texels not in self._prepared:
-            photo, iuv = self._photo, self.picture.iuv
-            texture = unfold(photo, iuv, ALL_PARTS, texels)
-            clearance = clearance_of(photo, iuv, ALL_PARTS)
-            self._prepared[texels] = Source(photo, iuv, photo.path, *texture, clearance=clearance)
+            photo = self.picture.as_photo()
+            shown = SourcePicture(photo, self.picture.iuv)
+            self._prepared[texels] = unfold_source([shown], texels, photo.path)
         return self._prepared[texels]
 
 
@@ -51,129 +58,115 @@ class Candidate(Protocol):
     """A method under test.
 
     Attributes:
-        label: its name in tables.
-        takes_turns: it keeps the whole machine busy, so calls wait for each other.
+        label: Its name in tables.
+        takes_turns: Whether it keeps the whole machine busy, so that calls wait for each other.
     """
 
     label: str
     takes_turns: bool
 
     def describe(self) -> dict[str, Any]:
-        """What it is, for the results file."""
+        """Tell what it is, for the results file."""
         ...
 
     def open_source(self, source: OpenedSource, /) -> Draw:
-        """Take in a source; what comes back draws it in a target's pose, as large as the target
-        or of its aspect."""
+        """Take in a source, and give the function that draws it."""
         ...
 
 
 class RenderedCandidate:
-    """What `mt run` would draw of the source in the target's pose and frame."""
+    """What `mt run` would draw of the source in the target's pose and frame.
 
-    def __init__(
-        self, label: str, *, texture_size: int, takes_turns: bool, background: str
-    ) -> None:
-        self.label = label
-        self.takes_turns = takes_turns
-        self._texture_size = texture_size
+    Args:
+        weights: Of the renderer; None: its default ones, or none.
+        background: Behind the person, as `mt run` takes it.
+    Raises: InputError for weights that cannot be used.
+    """
+
+    def __init__(self, renderer: str, weights: Path | None, background: str) -> None:
+        recipe = RENDERERS[renderer].recipe(weights)
+        # loaded now: what is wrong with a checkpoint is said before any pair is drawn; not
+        # compiled, as that may change the last bits of a picture
+        self._recipe = recipe.made_ready(False, 0, (), lambda _words: None)
         self._background = background
+        self._kind, self.label = ("weights", weights.stem) if weights else ("renderer", renderer)
+        self.takes_turns = recipe.occupies != "nothing"
 
     def describe(self) -> dict[str, Any]:
-        raise NotImplementedError
-
-    def open_renderer(self, source: Source) -> Renderer:
-        """The renderer of one source."""
-        raise NotImplementedError
+        facts = self._recipe.facts()
+        return {"label": self.label, "kind": self._kind, "renderer": self._recipe.name, **facts}
 
     def open_source(self, source: OpenedSource) -> Draw:
-        prepared = source.prepare(self._texture_size)
-        renderer = self.open_renderer(prepared)
+        prepared = source.prepare(self._recipe.texture_size)
+        renderer = self._recipe.renderer(self._recipe.appearance_of(prepared))
 
         def draw(_pair: Pair, target: PersonPicture) -> Image:
             size = (target.iuv.shape[0], target.iuv.shape[1])
-            frame = make_background(self._background, size, prepared, in_place=False)
-            x, y, width, height = cv2.boundingRect(occupancy(target.iuv))
-            person = Person(x, y, x + width, y + height, pixels=0, regions=())
-            window = plan_window([person])
-            crop = window.cut(target.iuv, renderer.working_size(window.side))
-            paste(frame, renderer.render(crop[None])[0], window)
-            return frame
+            background = make_background(self._background, size, prepared, in_place=False)
+            canvas = Canvas(background, crop=False, comparison=None)
+            return canvas.draw(renderer, target.iuv, plan_window([bounding_box(target.iuv)]))
 
         return draw
 
 
-class TextureCandidate(RenderedCandidate):
-    """The renderer without a network: the baseline that every network should beat."""
+class ResultsFolder:
+    """Pictures that another method made of the pairs; the naming is the pattern that finds most.
 
-    def __init__(self, background: str) -> None:
-        super().__init__(
-            "texture", texture_size=TEXTURE_TEXELS, takes_turns=False, background=background
-        )
-
-    def describe(self) -> dict[str, Any]:
-        return {"label": self.label, "kind": "renderer", "renderer": "texture"}
-
-    def open_renderer(self, source: Source) -> Renderer:
-        from motion_transfer.render.texture_renderer import TextureRenderer, tabulate_texture
-
-        return TextureRenderer(tabulate_texture(source))
-
-
-class WeightsCandidate(RenderedCandidate):
-    """The network with one checkpoint. Raises: WeightsError."""
-
-    def __init__(self, path: Path, background: str) -> None:
-        from motion_transfer.render.neural_renderer import PreparedNetwork
-        from motion_transfer.weights.checkpoint import load_checkpoint
-        from motion_transfer.weights.shipped import find_weights
-
-        path = find_weights(path)
-        self._model = load_checkpoint(path)
-        self._network = PreparedNetwork(self._model, compile=False)
-        self._path = path
-        super().__init__(
-            path.stem,
-            texture_size=self._model.config.finest_texture,
-            takes_turns=True,
-            background=background,
-        )
-
-    def describe(self) -> dict[str, Any]:
-        return {
-            "label": self.label,
-            "kind": "weights",
-            "renderer": "nhrr",
-            "file": self._path.name,
-            "sha256": digest_of(self._path),
-            "configuration": self._model.config.to_dict(),
-        }
-
-    def open_renderer(self, source: Source) -> Renderer:
-        from motion_transfer.render.neural_renderer import NeuralRenderer, encode_source
-
-        return NeuralRenderer(self._network, encode_source(self._model, source))
-
-
-class FolderCandidate:
-    """Pictures that another method made."""
+    Attributes:
+        pattern: That naming, of `PATTERNS`.
+    Raises: InputError if the folder is missing, or none of its pictures has a pair's name.
+    """
 
     takes_turns = False
 
-    def __init__(self, folder: ResultsFolder) -> None:
-        self.label = folder.path.name
-        self._folder = folder
+    def __init__(self, path: Path, pairs: Iterable[Pair]) -> None:
+        if not path.is_dir():
+            raise InputError(f"results {path} is not a folder")
+        self.path, self.label = path, path.name
+        self._files = {
+            file.name.removesuffix(file.suffix): file
+            for file in sorted(path.iterdir())
+            if file.suffix.lower() in PHOTO_SUFFIXES
+        }
+        pairs = list(pairs)
+        found = {
+            pattern: sum(_name_result(pattern, pair) in self._files for pair in pairs)
+            for pattern in PATTERNS
+        }
+        self.pattern = max(found, key=lambda pattern: found[pattern])
+        if not found[self.pattern]:
+            raise InputError(
+                f"results {path}: none of its {len(self._files)} pictures belongs to a pair; the"
+                f" first should be called {_name_result(self.pattern, pairs[0])}.png"
+            )
+
+    def find_problem(self, pair: Pair, framing: Framing) -> str | None:
+        """Tell what is wrong with a pair's picture, if anything is."""
+        name = _name_result(self.pattern, pair)
+        if name not in self._files:
+            return f"{self.path}/{name}.png does not exist"
+        try:
+            size = self.read(pair).shape[1::-1]
+            target = pair.target.load().rgb.shape[1::-1]
+            framing.check_aspect(size, target, f"result {self._files[name]}")
+        except InputError as error:
+            return str(error)
+        return None
+
+    def read(self, pair: Pair) -> Image:
+        """Read the picture of a pair. Raises: InputError."""
+        return read_photo(self._files[_name_result(self.pattern, pair)], "result").rgb
 
     def describe(self) -> dict[str, Any]:
         return {
             "label": self.label,
             "kind": "results",
-            "folder": self._folder.path.name,
-            "names": self._folder.pattern,
+            "folder": self.path.name,
+            "names": self.pattern,
         }
 
     def open_source(self, _source: OpenedSource) -> Draw:
-        return lambda pair, _target: self._folder.read(pair)
+        return lambda pair, _target: self.read(pair)
 
 
 class TargetCandidate:
@@ -189,15 +182,46 @@ class TargetCandidate:
         return lambda _pair, target: target.rgb
 
 
+def open_candidates(
+    options: EvaluationOptions, folders: Sequence[ResultsFolder]
+) -> list[Candidate]:
+    """Open the candidates that options name, the folders among them opened already.
+
+    Raises: InputError for weights that cannot be used, or if something is given twice.
+    """
+    weights = [find_weights(path) for path in options.weights]
+    candidates: list[Candidate] = [
+        *(RenderedCandidate(DEFAULT_RENDERER, path, options.background) for path in weights),
+        *folders,
+    ]
+    make_labels_unique(candidates, [*weights, *options.results])
+    if options.renderer is not None:
+        candidates.append(RenderedCandidate(options.renderer, None, options.background))
+    if options.clips is not None:  # real clips flicker, too
+        candidates.append(TargetCandidate())
+    return candidates
+
+
 def make_labels_unique(candidates: Sequence[Candidate], origins: Sequence[Path]) -> None:
     """Name candidates of equal label by their folders too.
 
     Raises: InputError if the same file or folder was given twice.
     """
-    if len({path.resolve() for path in origins}) < len(origins):
-        twice = next(p for p in origins if [q.resolve() for q in origins].count(p.resolve()) > 1)
-        raise InputError(f"{twice} is given twice")
+    resolved = [path.resolve() for path in origins]
+    for path, own in zip(origins, resolved, strict=True):
+        if resolved.count(own) > 1:
+            raise InputError(f"{path} is given twice")
     labels = [candidate.label for candidate in candidates]
-    for candidate, origin in zip(candidates, origins, strict=True):
+    for candidate, own in zip(candidates, resolved, strict=True):
         if labels.count(candidate.label) > 1:
-            candidate.label = f"{origin.resolve().parent.name}/{candidate.label}"
+            candidate.label = f"{own.parent.name}/{candidate.label}"
+
+
+def _name_result(pattern: str, pair: Pair) -> str:
+    """Fill a pattern in with a pair's names."""
+    words = {}
+    for word, picture in (("SOURCE", pair.source), ("TARGET", pair.target)):
+        words[word] = flat_stem(picture.name)
+        words[f"{word}.jpg"] = PurePosixPath(picture.name).name
+    # at once, as a source may itself be called TARGET
+    return re.sub(r"(SOURCE|TARGET)(\.jpg)?", lambda found: words[found[0]], pattern)

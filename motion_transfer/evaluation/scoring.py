@@ -6,47 +6,34 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Self, TypeVar
 
-import numpy as np
-from jaxtyping import Float, UInt8
-
 from motion_transfer.errors import RenderError
 from motion_transfer.evaluation.candidates import Candidate, OpenedSource
-from motion_transfer.evaluation.choice import Measures
-from motion_transfer.evaluation.framing import Framing, TargetFrame
-from motion_transfer.evaluation.measures import Scores
-from motion_transfer.media.image import write_png
+from motion_transfer.evaluation.framing import Framing, PairPictures
+from motion_transfer.evaluation.measures import Features, Measures
+from motion_transfer.media.pictures.photo import write_png
 from motion_transfer.media.publish import explain_disk_errors
-from motion_transfer.training.pairs import Pair, PairSource
-from motion_transfer.training.pictures import PersonPicture
+from motion_transfer.training.pairs import Pair, PairList
 
-Image = UInt8[np.ndarray, "H W 3"]
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class PairPictures:
-    """One pair as it is compared: everything at the framing's size."""
-
-    source: Image
-    target: TargetFrame
-    results: list[Image]
-
-
-@dataclass(frozen=True)
 class PairScores:
-    """The numbers of one pair, for each candidate in order.
+    """The numbers of one pair.
 
     Attributes:
-        features: FID's vectors, the target's first, where FID is measured.
+        scores: For each candidate in order: its numbers by column; NaN where there is none.
+        features: For each measure of sets: what it keeps of the target, then of each result.
     """
 
     pair: Pair
-    scores: list[Scores]
-    features: list[Float[np.ndarray, " D"]]
+    scores: list[dict[str, float]]
+    features: list[list[Features]]
 
 
 class StoppedError(Exception):
@@ -60,7 +47,7 @@ class Scorer:
     that calls it, and teams that wait for work take the cores from the one that has some.
 
     Args:
-        save: a folder for every result, `LABEL/SOURCE__TARGET.png`.
+        save: A folder for every result, `LABEL/SOURCE__TARGET.png`.
     """
 
     def __init__(
@@ -89,82 +76,72 @@ class Scorer:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def score(
-        self, pairs: PairSource, done: Callable[[int], None] = lambda _count: None
+        self, pairs: PairList, done: Callable[[int], None] = lambda _count: None
     ) -> list[PairScores]:
         """Score all pairs, in their order whatever the number of threads.
 
         Args:
-            done: called with how many more pairs are finished.
+            done: Called with how many more pairs are finished.
         Raises: RenderError naming candidate and pair; InputError for a file that broke meanwhile.
         """
         runs = [
             list(run) for _, run in groupby(pairs, key=lambda pair: (pair.group, pair.source.name))
         ]
-        scored: list[PairScores] = []
-        for part in self._pool.map(lambda run: self._score_run(run, done), runs):
-            scored += part
-        return scored
+        parts = self._pool.map(lambda run: self._score_run(run, done), runs)
+        return [entry for part in parts for entry in part]
 
     def pictures(self, pairs: Sequence[Pair]) -> list[PairPictures]:
-        """Some pairs' pictures, the same as were scored; each source is prepared once."""
+        """Draw some pairs again, the same as were scored; each source is prepared once."""
         runs: dict[str, list[int]] = {}
         for index, pair in enumerate(pairs):
             runs.setdefault(pair.source.name, []).append(index)
         drawn: dict[int, PairPictures] = {}
         for run in runs.values():
-            found = self._draw_run([pairs[index] for index in run])
-            drawn |= zip(run, found, strict=True)
+            drawn |= zip(run, self._draw_run([pairs[index] for index in run]), strict=True)
         return [drawn[index] for index in range(len(pairs))]
 
     def _score_run(self, run: list[Pair], done: Callable[[int], None]) -> list[PairScores]:
-        """Pairs with one source, which is prepared once."""
-        scored = []
-        before: tuple[Pair, PairPictures] | None = None
-        for pair, pictures in zip(run, self._draw_run(run), strict=True):
-            scores: list[Scores] = [{} for _ in self._candidates]
-            for measure in self._measures.each:
-                found = self._turn(
-                    measure.takes_turns,
-                    lambda m=measure, p=pictures: m.measure(p.results, p.target),
-                )
-                _merge(scores, found)
-            if self._measures.flicker is not None and before is not None:
-                last, shown = before
-                if last.frame is not None and pair.frame == last.frame + 1:
-                    _merge(
-                        scores,
-                        self._measures.flicker.measure(
-                            shown.results, shown.target, pictures.results, pictures.target
-                        ),
-                    )
-            scored.append(PairScores(pair, scores, self._features(pictures)))
-            before = pair, pictures
-            self._keep(pair, pictures)
+        """Score pairs with one source, which is prepared once."""
+        scored: list[PairScores] = []
+        before: PairPictures | None = None
+        for pair, shown in zip(run, self._draw_run(run), strict=True):
+            # the moments of a clip lie apart: only two frames in a row flicker
+            frame = scored[-1].pair.frame if scored else None
+            follows = frame is not None and pair.frame == frame + 1
+            scores = self._measure(shown, before if follows else None)
+            images = [shown.target.rgb, *shown.results]
+            features = [
+                self._turn(measure.takes_turns, partial(measure.features, images))
+                for measure in self._measures.sets
+            ]
+            scored.append(PairScores(pair, scores, features))
+            before = shown
+            self._keep(pair, shown)
             done(1)
         return scored
 
-    def _features(self, pictures: PairPictures) -> list[Float[np.ndarray, " D"]]:
-        fid = self._measures.fid
-        if fid is None:
-            return []
-        images = [pictures.target.rgb, *pictures.results]
-        return self._turn(fid.takes_turns, lambda: fid.features(images))
+    def _measure(self, shown: PairPictures, before: PairPictures | None) -> list[dict[str, float]]:
+        scores: list[dict[str, float]] = [{} for _ in shown.results]
+        for measure in self._measures.pairs:
+            names = [column.name for column in measure.columns]
+            found = self._turn(measure.takes_turns, partial(measure.measure, shown, before))
+            for own, numbers in zip(scores, found, strict=True):
+                own.update(zip(names, numbers, strict=True))
+        return scores
 
     def _draw_run(self, run: list[Pair]) -> Iterator[PairPictures]:
         source = OpenedSource(run[0].source.load())
         artists = [
-            self._attempt(candidate, run[0], lambda c=candidate: c.open_source(source))
+            self._attempt(candidate, run[0], partial(candidate.open_source, source))
             for candidate in self._candidates
         ]
         shown = self._framing.fit(source.picture.rgb)
         for pair in run:
             if self._stop.is_set():
                 raise StoppedError
-            target: PersonPicture = pair.target.load()
+            target = pair.target.load()
             results = [
-                self._framing.fit(
-                    self._attempt(candidate, pair, lambda d=draw, p=pair, t=target: d(p, t))
-                )
+                self._framing.fit(self._attempt(candidate, pair, partial(draw, pair, target)))
                 for candidate, draw in zip(self._candidates, artists, strict=True)
             ]
             yield PairPictures(shown, self._framing.fit_target(target), results)
@@ -186,8 +163,3 @@ class Scorer:
                 folder = self._save / candidate.label.replace("/", "-")
                 folder.mkdir(parents=True, exist_ok=True)
                 write_png(folder / f"{pair.name}.png", result)
-
-
-def _merge(scores: list[Scores], more: list[Scores]) -> None:
-    for own, added in zip(scores, more, strict=True):
-        own.update(added)

@@ -1,1 +1,4 @@
-"""Reading and writing images, IUV streams and video; nothing else in the package touches files."""
+"""Reading and writing pictures, IUV and video; nothing else in the package touches files.
+
+`iuv` and `pictures` read, `output` writes; each has a table of its formats in `formats`.
+"""

@@ -7,10 +7,10 @@ mistaken for IUV (drawings of parts, scaled UV), so that the readers can say wha
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from typing import Literal
 
 import av
 import numpy as np
@@ -18,18 +18,16 @@ from av.error import FFmpegError
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.image import read_photo
-from motion_transfer.media.iuv_array import ARRAY_SUFFIXES
-from motion_transfer.media.iuv_dump import DUMP_SUFFIXES
-from motion_transfer.media.iuv_image import IUV_SUFFIXES
-from motion_transfer.media.iuv_lookalikes import explain_picture, explain_scaled_uv
-from motion_transfer.media.picture_stream import PHOTO_SUFFIXES, list_photos
+from motion_transfer.media.iuv.formats import DriverKind, find_iuv_format
+from motion_transfer.media.iuv.lookalikes import explain_picture, explain_scaled_uv
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, list_photos, open_pictures
+from motion_transfer.media.pictures.photo import read_photo
 from nhrr_core.iuv import PART_COUNT
 
-DriverKind = Literal["iuv", "pictures"]
-
 LOOKED_AT = 48
-"""Frames, until one says what the driver is: clips fade in."""
+"""How many frames are looked at until one says what the driver is: clips fade in."""
+
+# The numbers below are chosen so that photos, IUV and IUV behind H.264 are told apart.
 
 CODEC_NOISE = 16
 """Grey levels that a codec adds to flat colours."""
@@ -43,29 +41,25 @@ LIT_LEVEL = 100
 colours over outlines, so the part channel is held to its limit in as many only."""
 
 EMPTY_SHARE = 0.1
-"""Of a frame of IUV nobody is in at least so much."""
+"""Least share of a frame of IUV that shows nobody."""
 
 Frame = UInt8[np.ndarray, "H W 3"]
 
 
 def tell_kind(path: Path) -> DriverKind:
-    """What a driver is.
+    """Tell what a driver is.
 
     Raises: InputError if there are pictures, and none of them says.
     """
-    if path.is_file() and path.suffix.lower() in (*ARRAY_SUFFIXES, *DUMP_SUFFIXES):
+    if not path.is_dir() and find_iuv_format(path).always_iuv:
         return "iuv"
-    frames = _frames(path)
-    if frames is None:
-        return "iuv"  # nothing that could be a picture: the readers of IUV say why
-    seen = dark = False
-    for frame in islice(frames, LOOKED_AT):
-        seen = True
+    dark = False
+    for frame in islice(_frames(path), LOOKED_AT):
         kind = kind_of(frame)
         if kind is not None:
             return kind
         dark = dark or bool(frame.any())
-    if seen and dark:
+    if dark:
         raise InputError(
             f"driver {path}: it cannot be told whether these are IUV or pictures of a person; say"
             " it with --driver-kind iuv or pictures"
@@ -74,34 +68,32 @@ def tell_kind(path: Path) -> DriverKind:
 
 
 def kind_of(frame: Frame) -> DriverKind | None:
-    """What one frame shows; None where it is too dark to be told."""
+    """Tell what one frame shows; None where it is too dark for that."""
     if not frame.any():
         return None
     for image in (frame, frame[..., ::-1]):
-        if _is_iuv(image) or _was_iuv(image) or _is_scaled(image):
+        if int(image[..., 0].max()) <= PART_COUNT:
+            background = image[image[..., 0] == 0]
+            if (len(background) and not background.any()) or explain_scaled_uv(image):
+                return "iuv"
+        if _was_iuv(image):
             return "iuv"
     if explain_picture(frame) is not None:
         return "iuv"
     pixels = frame.reshape(-1, 3)
+    # in IUV of either channel order, the first or the last channel is dark; in a picture of a
+    # crowded scene one of them may be, too, but then hardly anything is black
     bright = np.quantile(pixels, MOSTLY, axis=0) > PART_COUNT + CODEC_NOISE
-    crowded = _black_share(pixels) < EMPTY_SHARE and min(pixels.max(0)[[0, 2]]) > PART_COUNT
+    black = (pixels <= CODEC_NOISE).all(1).mean()
+    crowded = black < EMPTY_SHARE and min(pixels.max(0)[[0, 2]]) > PART_COUNT
     return "pictures" if (bright[0] and bright[2]) or (bright.any() and crowded) else None
 
 
-def _is_iuv(image: Frame) -> bool:
-    """Whether (I, U, V) are what they should be, exactly."""
-    part = image[..., 0]
-    background = image[part == 0]
-    return int(part.max()) <= PART_COUNT and len(background) > 0 and not background.any()
-
-
-def _is_scaled(image: Frame) -> bool:
-    return int(image[..., 0].max()) <= PART_COUNT and explain_scaled_uv(image) is not None
-
-
 def _was_iuv(image: Frame) -> bool:
-    """Whether (I, U, V) look like IUV behind a lossy codec: one channel dark, others not, and much
-    of the frame black in all."""
+    """Tell whether (I, U, V) look like IUV behind a lossy codec.
+
+    One channel is dark and the others are not, and much of the frame is black in all.
+    """
     pixels = image.reshape(-1, 3)
     person = pixels[(pixels > CODEC_NOISE).any(1)]
     if not 0 < len(person) <= (1 - EMPTY_SHARE) * len(pixels):
@@ -110,39 +102,21 @@ def _was_iuv(image: Frame) -> bool:
     return bool(high[0] <= PART_COUNT + CODEC_NOISE and high[1:].min() > LIT_LEVEL)
 
 
-def _black_share(pixels: UInt8[np.ndarray, "N 3"]) -> float:
-    return float((pixels <= CODEC_NOISE).all(1).mean())
+def _frames(path: Path) -> Iterator[Frame]:
+    """Decode the pictures of a driver, as they are, as far as there are any that can be read.
 
-
-def _frames(path: Path) -> Iterator[Frame] | None:
-    """The first pictures of a driver, as they are; None if there are none."""
-    if path.is_dir():
-        try:
+    Where there are none, or one is damaged, the readers of IUV say what is wrong.
+    """
+    with suppress(InputError, FFmpegError, IndexError):
+        if path.is_dir():
             files = list_photos(path)
-        except InputError:
-            return None
-        named = [f for f in files if f.stem.lower().endswith(("iuv", "_inds"))]
-        return None if named else _photos(files)
-    if not path.is_file():
-        return None
-    if path.suffix.lower() in (*PHOTO_SUFFIXES, *IUV_SUFFIXES):
-        return _photos([path])
-    return _decode(path)
-
-
-def _photos(files: Iterable[Path]) -> Iterator[Frame]:
-    """Pictures that can be read; of the others the readers say what is wrong."""
-    for file in files:
-        try:
-            yield read_photo(file, "driver").rgb
-        except InputError:
-            return
-
-
-def _decode(path: Path) -> Iterator[Frame]:
-    try:
-        with av.open(str(path)) as container:
-            for frame in container.decode(video=0):
-                yield frame.to_ndarray(format="rgb24")
-    except (FFmpegError, IndexError):
-        return
+            # one file that is called IUV is enough: photos may lie between
+            if not any(file.stem.lower().endswith(("iuv", "_inds")) for file in files):
+                yield from (read_photo(file, "driver").rgb for file in files)
+        elif path.suffix.lower() in PHOTO_SUFFIXES:
+            yield read_photo(path, "driver").rgb
+            yield from islice(open_pictures(path).read(), 1, None)  # it may hold several
+        elif path.is_file():
+            with av.open(str(path)) as container:
+                for frame in container.decode(video=0):
+                    yield frame.to_ndarray(format="rgb24")

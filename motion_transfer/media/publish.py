@@ -1,4 +1,7 @@
-"""Writing so that a final name only ever holds something whole."""
+"""Writing so that a final name only ever holds something whole.
+
+What is made lies in a hidden folder beside it, on the same file system, until it is renamed.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,10 @@ def check_destination(path: Path, *, force: bool) -> None:
     """
     if path.exists() and not force:
         raise OutputError(f"{path} exists already; choose another name or add --force")
-    if path.is_dir() and any(not _is_frame(item) for item in path.iterdir()):
+    # a mistyped name is not to cost somebody a folder of other things
+    if path.is_dir() and any(
+        item.suffix != ".png" or not item.stem.isdigit() for item in path.iterdir()
+    ):
         raise OutputError(
             f"{path} is a folder with other things than frames in it, and is not replaced even"
             " with --force; choose another name"
@@ -35,18 +41,13 @@ def check_destination(path: Path, *, force: bool) -> None:
 
 @contextmanager
 def work_folder(final: Path) -> Iterator[Path]:
-    """A hidden folder beside `final`, on the same file system, gone when the block ends.
+    """Make a hidden folder beside `final`, on the same file system, gone when the block ends.
 
     Raises: OutputError where the disk is full or the place cannot be written.
     """
-    made: list[Path] = []
     with explain_disk_errors(final):
         parent = final.absolute().parent
-        for folder in (parent, *parent.parents):
-            if folder.exists():
-                break
-            made.append(folder)
-        parent.mkdir(parents=True, exist_ok=True)
+        made = make_folder(parent)
         folder = Path(tempfile.mkdtemp(prefix=f".{final.name}.work-", dir=parent))
     try:
         with explain_disk_errors(final):
@@ -54,11 +55,23 @@ def work_folder(final: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         if not final.exists():
-            for folder in made:
-                try:
-                    folder.rmdir()
-                except OSError:  # somebody else put something there meanwhile: theirs to keep
-                    break
+            remove_folders(made)
+
+
+def make_folder(folder: Path) -> list[Path]:
+    """Make a folder and those that it lies in. Returns: Those that were made, innermost first."""
+    missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def remove_folders(folders: list[Path]) -> None:
+    """Remove folders that were made for nothing, innermost first."""
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:  # somebody else put something there meanwhile: theirs to keep
+            break
 
 
 @contextmanager
@@ -93,7 +106,7 @@ def publish(finished: Path, final: Path) -> None:
         shutil.rmtree(old)
     else:
         finished.replace(final)
-    _sync(final.absolute().parent)
+    _sync(final.absolute().parent)  # the new name itself is in there
 
 
 def _sync(path: Path) -> None:
@@ -102,7 +115,3 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _is_frame(path: Path) -> bool:
-    return path.suffix == ".png" and path.stem.isdigit()

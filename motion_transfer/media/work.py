@@ -1,10 +1,11 @@
-"""The work folder of an output: finished pieces, their journal, and a lock.
+"""The work folder of an output: finished pieces, the journal that knows them, and a lock.
 
 It lies beside the output, hidden, on the same file system, under a name that follows from the
 output's: whoever makes the same output again finds what an interrupted run has finished. A piece is
 published by writing it under another name, syncing, renaming, and only then noting it in the
-journal, with a key of the content it was made from. The operating system releases the lock of a
-process that dies, so a lock that is held has a living owner.
+journal, one JSON line each, with a key of the content it was made from; a piece without its line is
+made again. The operating system releases the lock of a process that dies, so a lock that is held
+has a living owner.
 """
 
 from __future__ import annotations
@@ -19,20 +20,75 @@ import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
-from motion_transfer.errors import OutputError
-from motion_transfer.media.journal import Journal
-from motion_transfer.media.publish import explain_disk_errors, publish
+from motion_transfer.errors import InputError, OutputError
+from motion_transfer.media.publish import (
+    explain_disk_errors,
+    make_folder,
+    publish,
+    remove_folders,
+)
 
-READ_BYTES = 1 << 20
+Entry = dict[str, Any]
+
+
+class Journal:
+    """Lines that are only ever added, by one writer at a time, which a lock sees to."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def read(self) -> list[Entry]:
+        """Read every whole line up to the first damaged one."""
+        return self._read()[0]
+
+    def repair(self) -> list[Entry]:
+        """Read it, and cut off what is not believed; for the lock's holder only."""
+        entries, whole_bytes = self._read()
+        if self._path.exists() and self._path.stat().st_size > whole_bytes:
+            os.truncate(self._path, whole_bytes)
+        return entries
+
+    def _read(self) -> tuple[list[Entry], int]:
+        try:
+            data = self._path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            return [], 0
+        entries: list[Entry] = []
+        whole_bytes = 0
+        for line in data.splitlines(keepends=True):
+            try:  # a line that a crash cut short has no end
+                entry = json.loads(line) if line.endswith(b"\n") else None
+            except ValueError:
+                entry = None
+            if not isinstance(entry, dict):
+                break
+            entries.append(entry)
+            whole_bytes += len(line)
+        return entries, whole_bytes
+
+    def append(self, entry: Entry) -> None:
+        """Write a line; on return it is on disk. Raises: OSError, with nothing written."""
+        line = json.dumps(entry, separators=(",", ":")).encode() + b"\n"
+        with self._path.open("ab", buffering=0) as file:
+            whole_bytes = file.seek(0, os.SEEK_END)
+            try:
+                while line:  # an unbuffered file may take less than it is given
+                    line = line[file.write(line) :]
+                os.fsync(file.fileno())
+            except OSError:  # a full disk: no later line is believed behind half a line
+                os.truncate(self._path, whole_bytes)
+                raise
+
+
+READ_BYTES = 1 << 20  # at a time, for digests: large enough, and small in memory
 
 
 def work_path(final: Path) -> Path:
-    """Where the work folder of an output lies."""
+    """Name the work folder of an output."""
     return final.absolute().with_name(f".{final.name}.work")
 
 
@@ -41,7 +97,7 @@ def locked(folder: Path, what: str) -> Iterator[None]:
     """Hold an existing folder's lock. Raises: OutputError naming who holds it already.
 
     Args:
-        what: begins the message, such as `cannot write out.mp4`.
+        what: Begins the message, such as `cannot write out.mp4`.
     """
     owner = folder / "owner.json"
     lock = FileLock(folder / "lock", timeout=0)
@@ -51,7 +107,7 @@ def locked(folder: Path, what: str) -> Iterator[None]:
         try:
             who = json.loads(owner.read_text())
             words = f"process {who['process']} on {who['host']}"
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError):  # it may be writing that just now
             words = "another process"
         raise OutputError(f"{what}: {words} is at work on it; wait for it, or stop it") from None
     try:
@@ -80,11 +136,7 @@ class WorkFolder:
     def __enter__(self) -> Self:
         """Raises: OutputError if somebody else works there, or it cannot be written."""
         with explain_disk_errors(self._final):
-            for folder in self.path.parents:
-                if folder.exists():
-                    break
-                self._made.append(folder)
-            self.path.mkdir(parents=True, exist_ok=True)
+            self._made = make_folder(self.path)[1:]
             self._lock = locked(self.path, f"cannot write {self._final}")
             self._lock.__enter__()
             if self._restart:
@@ -93,12 +145,7 @@ class WorkFolder:
             self._remove_strays()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._pieces:
             self._remove_strays()
         else:
@@ -110,14 +157,10 @@ class WorkFolder:
         shutil.rmtree(self.path, ignore_errors=True)
         self._pieces = {}
         if not self._final.exists():
-            for folder in self._made:
-                try:
-                    folder.rmdir()
-                except OSError:  # somebody else put something there meanwhile: theirs to keep
-                    break
+            remove_folders(self._made)
 
     def has(self, piece: str, key: str) -> bool:
-        """Whether a piece is there, whole, and made from content with that key."""
+        """Tell whether a piece is there, whole, and made from content with that key."""
         entry = self._pieces.get(piece)
         if entry is None or entry["key"] != key:
             return False
@@ -128,7 +171,7 @@ class WorkFolder:
             return False
 
     def temporary(self, piece: str) -> Path:
-        """A name to write a piece under before `finish`; never the same twice."""
+        """Make a name to write a piece under before `finish`; never the same twice."""
         path = Path(piece)
         return self.path / f"{path.stem}.part-{uuid.uuid4().hex[:8]}{path.suffix}"
 
@@ -144,20 +187,20 @@ class WorkFolder:
             self._pieces[piece] = entry
 
     def publish(self, finished: Path, key: str) -> None:
-        """Move a finished output onto its final name. Killed at any moment, `published` knows."""
+        """Move a finished output onto its final name; killed at any moment, `published` knows."""
         entry = {"piece": "output", "key": key, "sha256": _identity(finished)}
         self._journal.append(entry)
         publish(finished, self._final)
 
     def published(self, key: str | None = None) -> bool:
-        """Whether the file under the final name is the one that `publish` put there."""
+        """Tell whether the file under the final name is the one that `publish` put there."""
         entry = self._pieces.get("output")
         if entry is None or not self._final.exists() or key not in (None, entry["key"]):
             return False
         return _identity(self._final) == entry["sha256"]
 
     def _remove_strays(self) -> None:
-        """What was being written when its writer was stopped."""
+        """Remove what was being written when its writer was stopped."""
         for stray in self.path.glob("*.part-*"):
             _remove(stray)
 
@@ -168,14 +211,14 @@ class WorkFolder:
 
 
 def was_published(final: Path) -> bool:
-    """Whether an output's run was stopped after publishing it, before it could clear its folder."""
+    """Tell whether an output's run was stopped after publishing it, before its folder was gone."""
     entries = Journal(work_path(final) / "journal.jsonl").read()
     output = [entry["sha256"] for entry in entries if entry["piece"] == "output"]
     return bool(output) and final.exists() and _identity(final) == output[-1]
 
 
 def publish_piece(written: Path, final: Path) -> str:
-    """Sync a file or folder of files and give it its name; its digest. Raises: OSError."""
+    """Sync a file or folder of files and give it its name. Returns: its digest. Raises: OSError."""
     digest = digest_of(written)
     if final.is_dir():
         shutil.rmtree(final)
@@ -184,12 +227,12 @@ def publish_piece(written: Path, final: Path) -> str:
 
 
 def key_of(facts: Mapping[str, Any]) -> str:
-    """A digest of facts that JSON can hold; paths and fractions as words."""
+    """Make a digest of facts that JSON can hold; paths and fractions count as words."""
     return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a file, or of a folder's files and their names; hexadecimal. Raises: OSError."""
+    """Make the SHA-256 of a file, or of a folder's files and their names. Raises: OSError."""
     digest = hashlib.sha256()
     files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
     for file in files:
@@ -201,8 +244,18 @@ def digest_of(path: Path) -> str:
     return digest.hexdigest()
 
 
+def digest_file(path: Path, what: str) -> str:
+    """Compute the SHA-256 of a file or folder. Raises: InputError naming what it was wanted for."""
+    try:
+        return digest_of(path)
+    except FileNotFoundError:
+        raise InputError(f"{what} {path} does not exist") from None
+    except OSError as error:
+        raise InputError(f"{what} {path} cannot be read: {error.strerror}") from error
+
+
 def _identity(path: Path) -> str:
-    """What a rename leaves as it is, and nothing else does."""
+    """Take from a file's status what a rename leaves as it is, and nothing else does."""
     status = path.stat()
     return f"{status.st_ino}:{status.st_mtime_ns}:{0 if path.is_dir() else status.st_size}"
 

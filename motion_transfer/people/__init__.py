@@ -1,60 +1,78 @@
 """Synthetic people: photos with exact IUV, and drivers from motion.
 
-Public names are loaded when they are first used, so that asking for one thing (whether a driver is
-a motion, say) does not load all of it.
+Everything that the rest of the program may use has its name here. A name is loaded when it is first
+used: every run asks whether its driver is a motion, and few need the body model.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from motion_transfer.extras import require_extra
 
 if TYPE_CHECKING:
     from motion_transfer.people.album import AlbumOptions, write_album
-    from motion_transfer.people.dataset import PeopleDataset, PeopleStream
-    from motion_transfer.people.driver import MotionDriver, MotionOptions
-    from motion_transfer.people.figure.body import Shape
-    from motion_transfer.people.person import Person, sample_person
+    from motion_transfer.people.dataset import PeopleDataset, PeopleStream, Split
+    from motion_transfer.people.driver import (
+        MotionDriver,
+        MotionOptions,
+        check_motion,
+        open_motion,
+        record_motion,
+    )
+    from motion_transfer.people.figure.body import (
+        FIRST_USE,
+        Body,
+        BodyModel,
+        Shape,
+        is_cached,
+        load_body_model,
+    )
+    from motion_transfer.people.figure.camera import Camera
+    from motion_transfer.people.figure.mesh import PosedBody
+    from motion_transfer.people.figure.rasterise import Triangles, depths, rasterise
+    from motion_transfer.people.person import DressedPerson, Person, sample_person
     from motion_transfer.people.photo import PersonPhoto, Shot, sample_shot
     from motion_transfer.people.picture.iuv_noise import IuvNoise
-    from motion_transfer.people.recording import record_motion
-
-_HOMES = {
-    "AlbumOptions": "album",
-    "write_album": "album",
-    "PeopleDataset": "dataset",
-    "PeopleStream": "dataset",
-    "MotionDriver": "driver",
-    "MotionOptions": "driver",
-    "Shape": "figure.body",
-    "Person": "person",
-    "sample_person": "person",
-    "PersonPhoto": "photo",
-    "Shot": "photo",
-    "sample_shot": "photo",
-    "IuvNoise": "picture.iuv_noise",
-    "record_motion": "recording",
-}
 
 __all__ = [
-    "AlbumOptions",
-    "IuvNoise",
-    "MotionDriver",
-    "MotionOptions",
-    "PeopleDataset",
-    "PeopleStream",
-    "Person",
-    "PersonPhoto",
-    "Shape",
-    "Shot",
-    "record_motion",
-    "sample_person",
-    "sample_shot",
-    "write_album",
-]
+    "FIRST_USE", "SCHEME", "AlbumOptions", "Body", "BodyModel", "Camera", "DressedPerson",
+    "IuvNoise", "MotionDriver", "MotionOptions", "PeopleDataset", "PeopleStream", "Person",
+    "PersonPhoto", "PosedBody", "Shape", "Shot", "Split", "Triangles", "check_motion", "depths",
+    "is_cached", "is_motion", "load_body_model", "open_motion", "rasterise", "record_motion",
+    "sample_person", "sample_shot", "write_album",
+]  # fmt: skip
+
+_NAMES_OF = {
+    "album": "AlbumOptions write_album",
+    "dataset": "PeopleDataset PeopleStream Split",
+    "driver": "MotionDriver MotionOptions check_motion open_motion record_motion",
+    "figure.body": "FIRST_USE Body BodyModel Shape is_cached load_body_model",
+    "figure.camera": "Camera",
+    "figure.mesh": "PosedBody",
+    "figure.rasterise": "Triangles depths rasterise",
+    "person": "DressedPerson Person sample_person",
+    "photo": "PersonPhoto Shot sample_shot",
+    "picture.iuv_noise": "IuvNoise",
+}
+_HOMES = {name: home for home, names in _NAMES_OF.items() for name in names.split()}
+
+SCHEME = "people:"
+"""How the name of a driver begins that is a motion and no file."""
+
+
+def is_motion(path: Path | str) -> bool:
+    """Tell whether a driver's name means a motion and not a file."""
+    return str(path).startswith(SCHEME)
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    try:
+        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    except ModuleNotFoundError:
+        require_extra("people")  # says how to install what is missing
+        raise

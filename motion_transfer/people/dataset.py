@@ -1,4 +1,4 @@
-"""Pairs of photos of synthetic people, made as they are asked for."""
+"""People by number, and pairs of photos of them for training, made as they are asked for."""
 
 from __future__ import annotations
 
@@ -6,16 +6,14 @@ from typing import Literal, get_args
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.utils.data import Dataset
 
 from motion_transfer.errors import InputError
-from motion_transfer.people.extra import one_thread
-from motion_transfer.people.figure.body import load_body_model
-from motion_transfer.people.figure.framing import Framing
+from motion_transfer.people.figure.body import load_body_model, one_thread
+from motion_transfer.people.figure.camera import Framing
 from motion_transfer.people.person import DressedPerson, Person, sample_person
-from motion_transfer.people.photo import PersonPhoto, Photographer, Shot, sample_shot
+from motion_transfer.people.photo import PersonPhoto, Shot, sample_shot, take_photo
 from motion_transfer.people.picture.iuv_noise import IuvNoise
 
 Split = Literal["train", "held-out"]
@@ -23,14 +21,22 @@ SPLITS: tuple[str, ...] = get_args(Split)
 """Two streams of people that never meet, whatever the seed."""
 
 
+def check_numbering(seed: int, split: str) -> None:
+    """Raise InputError for a seed or a split by which no people are numbered."""
+    if split not in SPLITS:
+        raise InputError(f"split {split!r}; supported are {', '.join(SPLITS)}")
+    if seed < 0:
+        raise InputError(f"seed is {seed}; it must be 0 or more")
+
+
 class PeopleStream:
     """People by number: the same seed, split and number always give the same bytes.
 
     Args:
         size: (width, height) of the photos in px.
-        noise: faults of DensePose to put into the IUV; None: exact.
-        noisy_share: share of the photos that get them.
-        framing: None: mixed.
+        noise: Faults of DensePose to put into the IUV; None: exact.
+        noisy_share: The share of the photos that get them.
+        framing: What the photos show of the body; None: mixed.
     """
 
     def __init__(
@@ -43,36 +49,33 @@ class PeopleStream:
         noisy_share: float = 1.0,
         framing: Framing | None = None,
     ) -> None:
-        if split not in SPLITS:
-            raise InputError(f"split {split!r}; supported are {', '.join(SPLITS)}")
-        if seed < 0:
-            raise InputError(f"seed is {seed}; it must be 0 or more")
+        check_numbering(seed, split)
         self.size = size
         self._entropy = (seed, SPLITS.index(split))
         self._noise, self._noisy_share = noise, noisy_share
         self._framing: Framing | None = framing
         self._model = load_body_model()
-        self._photographer = Photographer(self._model)
 
     def person(self, number: int) -> Person:
-        """Who has that number."""
+        """Sample who has that number."""
         return sample_person(self._random(number, 0))
 
     def shot(self, number: int, view: int) -> Shot:
-        """How that person is photographed for the given time (0 first)."""
+        """Sample how that person is photographed for the given time (0 first)."""
         return sample_shot(self._random(number, 1 + view), framing=self._framing)
 
     def dress(self, number: int) -> DressedPerson:
-        """The geometry of that person."""
+        """Build the geometry of that person."""
         with one_thread():
             return DressedPerson(self.person(number), self._model)
 
     def take(self, dressed: DressedPerson, shot: Shot) -> PersonPhoto:
-        """Take a photo."""
+        """Take a photo of a dressed person."""
+        # a stream of its own, so that the share decides about nothing but who gets noise
         noisy = np.random.default_rng((shot.seed, 1)).random() < self._noisy_share
+        noise = self._noise if noisy else None
         with one_thread():
-            noise = self._noise if noisy else None
-            return self._photographer.take(dressed, shot, self.size, noise)
+            return take_photo(dressed, shot, self.size, noise)
 
     def _random(self, number: int, purpose: int) -> np.random.Generator:
         return np.random.default_rng((*self._entropy, number, purpose))
@@ -84,8 +87,8 @@ class PeopleDataset(Dataset):
     Indexable, so that samplers, several workers and resumed runs see the same pairs.
 
     Args:
-        length: number of pairs; each has a person of its own.
-        **settings: of `PeopleStream`.
+        length: The number of pairs; each has a person of its own.
+        **settings: Those of `PeopleStream`.
     """
 
     def __init__(self, length: int, **settings) -> None:
@@ -99,9 +102,9 @@ class PeopleDataset(Dataset):
         return self._length
 
     def __getitem__(self, index: int) -> dict[str, Tensor]:
-        """One pair.
+        """Make one pair.
 
-        Returns: for `source` and `target` each: `_image` float 3 x H x W in [-1, 1], `_iuv` uint8
+        Returns: For `source` and `target` each: `_image` float 3 x H x W in [-1, 1], `_iuv` uint8
             3 x H x W (I, U, V), `_alpha` float 1 x H x W in [0, 1].
         Raises: IndexError beyond the length.
         """
@@ -113,15 +116,8 @@ class PeopleDataset(Dataset):
         pair: dict[str, Tensor] = {}
         for view, role in enumerate(("source", "target")):
             photo = self._stream.take(dressed, self._stream.shot(index, view))
-            pair |= {f"{role}_{name}": value for name, value in photo_tensors(photo).items()}
+            rgb, iuv = (torch.from_numpy(im).permute(2, 0, 1) for im in (photo.rgb, photo.iuv))
+            pair[f"{role}_image"] = rgb.float() / 127.5 - 1
+            pair[f"{role}_iuv"] = iuv.contiguous()
+            pair[f"{role}_alpha"] = torch.from_numpy(photo.alpha)[None].float() / 255
         return pair
-
-
-def photo_tensors(photo: PersonPhoto) -> dict[str, Float[Tensor, "C H W"] | UInt8[Tensor, "3 H W"]]:
-    """A photo as the model takes it."""
-    rgb, iuv = (torch.from_numpy(image).permute(2, 0, 1) for image in (photo.rgb, photo.iuv))
-    return {
-        "image": rgb.float() / 127.5 - 1,
-        "iuv": iuv.contiguous(),
-        "alpha": torch.from_numpy(photo.alpha)[None].float() / 255,
-    }

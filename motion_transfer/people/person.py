@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from motion_transfer.people.clothes.garments import dress_body
-from motion_transfer.people.clothes.outfits import Outfit, sample_outfit
+from motion_transfer.people.clothes.garments import DressedBody
+from motion_transfer.people.clothes.outfits import sample_outfit
 from motion_transfer.people.clothes.surface import BodySurface
+from motion_transfer.people.clothes.wardrobe import Outfit
 from motion_transfer.people.figure.body import Body, BodyModel, Shape
 from motion_transfer.people.figure.mesh import Piece, PosedBody
 from motion_transfer.people.head.faces import Face, sample_face
-from motion_transfer.people.head.hair import hair_pieces
-from motion_transfer.people.head.hair_styles import Hair, sample_hair
+from motion_transfer.people.head.hair import Hair, hair_pieces, sample_hair
 from motion_transfer.people.head.skin import skin_pieces
 from motion_transfer.people.motion.capsules import Capsules
-from motion_transfer.people.motion.poses import Pose
-from motion_transfer.people.motion.posing import posed
+from motion_transfer.people.motion.poses import Pose, posed
 from motion_transfer.people.motion.untangling import untangled
 from motion_transfer.people.picture.shade import Scene
 
@@ -34,34 +33,33 @@ class Person:
     outfit: Outfit
 
     def description(self) -> dict[str, Any]:
-        """Plain numbers, words and lists, for JSON."""
+        """Describe the person in plain numbers, words and lists, for JSON."""
         return asdict(self)
 
 
 def sample_person(rng: np.random.Generator) -> Person:
-    """Anybody, over the whole range of adult bodies."""
+    """Sample anybody, over the whole range of adult bodies."""
     shape = sample_shape(rng)
     face = sample_face(rng, shape)
-    return Person(
-        shape=shape,
-        face=face,
-        hair=sample_hair(rng, shape, face),
-        outfit=sample_outfit(rng, shape),
-    )
+    # hair before the outfit: numbers are drawn in this order
+    return Person(shape, face, sample_hair(rng, shape, face), sample_outfit(rng, shape))
 
 
 def sample_shape(rng: np.random.Generator) -> Shape:
-    """An adult's build: most are near the middle, some far from it."""
+    """Sample an adult's build: most are near the middle, some far from it.
+
+    Middles and widths are chosen by eye, so that streets would look alike.
+    """
     female = rng.random() < 0.55
     gender = 1 - abs(rng.normal(0, 0.12)) if female else abs(rng.normal(0, 0.12))
 
     def spread(middle: float, width: float) -> float:
         return float(np.clip(rng.normal(middle, width), 0, 1))
 
-    origins = rng.dirichlet((0.5, 0.5, 0.5))
+    origins = rng.dirichlet((0.5, 0.5, 0.5))  # below 1: mostly one of them, seldom an even mixture
     return Shape(
         gender=float(np.clip(gender, 0, 1)),
-        age=float(0.64 + 0.34 * rng.beta(1.0, 2.4)),
+        age=float(0.64 + 0.34 * rng.beta(1.0, 2.4)),  # adults, the young ones more often
         muscle=spread(0.5, 0.17),
         weight=spread(0.46, 0.18),
         height=spread(0.5, 0.17),
@@ -74,38 +72,31 @@ def sample_shape(rng: np.random.Generator) -> Shape:
     )
 
 
+_body_surface = lru_cache(maxsize=1)(BodySurface)  # once for all people of a model
+
+
 class DressedPerson:
     """A person's geometry at rest, ready for any number of poses.
 
     Attributes:
-        person: the description.
-        body: the bare body at rest.
-        pieces: skin, garments, hair; the skin comes first.
-        scene: the pieces, ready to be drawn.
+        model: What the body was made by.
+        body: The bare body at rest.
+        pieces: Skin, garments, hair; the skin comes first.
+        scene: The pieces, ready to be drawn.
     """
 
     def __init__(self, person: Person, model: BodyModel) -> None:
         self.person = person
         self.body: Body = model.body(person.shape)
-        self._model = model
+        self.model = model
         self._capsules = Capsules(model, self.body)
         skin, *rest = skin_pieces(person.face, self.body, model)
-        dressed = dress_body(person.outfit, self.body, model, body_surface(model))
-        covered = replace(skin, keep=np.minimum(skin.keep, dressed.body_keep))
-        self.pieces: list[Piece] = [
-            covered,
-            *rest,
-            *dressed.pieces,
-            *hair_pieces(person.hair, self.body, model),
-        ]
+        dressed = DressedBody(person.outfit, self.body, _body_surface(model))
+        covered = replace(skin, keep=np.minimum(skin.keep, dressed.keep))
+        hair = hair_pieces(person.hair, self.body, model)
+        self.pieces: list[Piece] = [covered, *rest, *dressed.pieces, *hair]
         self.scene = Scene(self.pieces)
 
     def posed(self, pose: Pose) -> PosedBody:
-        """The body in a pose, on the floor; limbs that would go through it are moved aside."""
-        return posed(self.body, untangled(pose, self._capsules), self._model)
-
-
-@lru_cache(maxsize=1)
-def body_surface(model: BodyModel) -> BodySurface:
-    """Names of places on the skin, worked out once."""
-    return BodySurface(model)
+        """Pose the body on the floor; limbs that would go through it are moved aside."""
+        return posed(self.body, untangled(pose, self._capsules), self.model)

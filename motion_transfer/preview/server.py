@@ -1,4 +1,10 @@
-"""The preview as a web page on this machine only."""
+"""The preview as a web page on this machine only.
+
+Every request has to come from the page that this program's user opened. A page of the preview is
+reached by a link with a random token in its path, which other websites in the same browser do not
+know; names that resolve to this machine (DNS rebinding) are refused by their Host, and requests
+that another page makes by their Origin.
+"""
 
 from __future__ import annotations
 
@@ -12,32 +18,116 @@ from concurrent.futures import CancelledError, Future
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from motion_transfer.errors import InputError, MotionTransferError, OutputError
-from motion_transfer.preview.draw_queue import StaleError
-from motion_transfer.preview.guard import Guard
+from motion_transfer.preview.queue import StaleError
 
 if TYPE_CHECKING:
     from motion_transfer.preview.session import Session
 
 HOST = "127.0.0.1"
+LOCAL_NAMES = (HOST, "localhost", "::1")
+MOST_BODY_BYTES = 64 * 1024  # a handful of options
+STATE_SECONDS = 0.1  # between two looks for changes
+PATIENCE_SECONDS = 0.1  # between two looks whether somebody still waits for a picture
+NOT_WAITED_FOR = 499  # nginx's status for a client that has gone: nobody reads the answer
+KEEP = {"Cache-Control": "private, max-age=3600, immutable"}  # a picture's address has its key
 PAGE_TYPES = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
     ".svg": "image/svg+xml",
 }
-STATE_SECONDS = 0.1  # between two looks for changes
-SHORT_PATIENCE = 0.1  # s, between two looks whether somebody still waits for a picture
-KEEP = {"Cache-Control": "private, max-age=3600, immutable"}  # a picture's address has its key
+STATUSES = {StaleError: 409, OutputError: 409, InputError: 422, Exception: 500}
+"""What is answered to an error; the first kind that it is counts."""
+
+HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:;"
+        " media-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none';"
+        " frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",  # the link holds the token
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+
+
+class Guard:
+    """Lets through what is allowed, and sends strict headers with every answer.
+
+    A tunnel may bring the page to another port, so any port will do in Host and Origin; the two
+    have to agree.
+    """
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self._app = app
+        self._token = token
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_strictly(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers[name] = value
+                headers.setdefault("Cache-Control", "no-store")
+            await send(message)
+
+        refusal = self._refuse(scope)
+        if refusal is not None:
+            status, words = refusal
+            await JSONResponse({"error": words}, status)(scope, receive, send_strictly)
+            return
+        await self._app(scope, receive, send_strictly)
+
+    def _refuse(self, scope: Scope) -> tuple[int, str] | None:
+        """Give status and reason for what is not allowed."""
+        headers = Headers(scope=scope)
+        host = headers.get("host", "")
+        if _name_of(f"http://{host}") not in LOCAL_NAMES:
+            return 403, "this page is only for the machine that it runs on"
+        origin = headers.get("origin")
+        if origin is not None and origin != f"http://{host}":
+            return 403, "another page asked for this"
+        token = scope["path"].lstrip("/").split("/", 1)[0]
+        # whose time does not tell how much of a guess was right
+        if not secrets.compare_digest(token.encode(), self._token.encode()):
+            return 404, "nothing here; open the link that mt preview printed"
+        if scope["method"] == "POST":
+            # no form of another page can send this type without asking first
+            if headers.get("content-type", "").split(";")[0].strip() != "application/json":
+                return 415, "the body has to be application/json"
+            length = headers.get("content-length", "")
+            if not length.isdigit():
+                return 411, "the length of the body has to be told"
+            if int(length) > MOST_BODY_BYTES:
+                return 413, f"the body is larger than {MOST_BODY_BYTES} bytes"
+        return None
+
+
+def _name_of(url: str) -> str | None:
+    try:
+        return urlsplit(url).hostname
+    except ValueError:
+        return None
 
 
 class PreviewServer:
@@ -48,7 +138,7 @@ class PreviewServer:
     """
 
     def __init__(self, port: int) -> None:
-        """Raises: OutputError if the port is taken; 0 takes any that is free."""
+        """Open a port; 0 takes any that is free. Raises: OutputError if it is taken."""
         self._session: Future[Session] = Future()
         self._token = secrets.token_urlsafe(24)
         self._socket = socket.socket()
@@ -61,9 +151,9 @@ class PreviewServer:
             raise OutputError(
                 f"port {port} cannot be used ({error}); choose another --port, or 0"
             ) from error
-        app = Guard(make_app(self._session, self._token, self._is_closing), self._token)
+        app = make_app(self._session, self._token, lambda: self._server.should_exit)
         config = uvicorn.Config(
-            app,
+            Guard(app, self._token),
             log_level="error",
             lifespan="off",
             server_header=False,
@@ -74,13 +164,13 @@ class PreviewServer:
 
     @property
     def link(self) -> str:
-        """Where the page is, token included."""
+        """The page's address, token included."""
         return f"http://{HOST}:{self._socket.getsockname()[1]}/{self._token}/"
 
     def serve(self, make_session: Callable[[], Session]) -> None:
         """Answer until a signal comes, which is raised again when everything is closed.
 
-        Raises: whatever making the session raised.
+        Raises: Whatever making the session raised.
         """
 
         def make() -> None:
@@ -98,12 +188,9 @@ class PreviewServer:
             maker.join()
             self._session.result().close()
 
-    def _is_closing(self) -> bool:
-        return self._server.should_exit
-
 
 def make_app(session: Future[Session], token: str, closing: Callable[[], bool]) -> Starlette:
-    """The routes below the token; see each handler."""
+    """Make the app: each route, below the token, has its handler."""
     handlers = _Handlers(session, closing)
     routes = [
         Route("/", handlers.page),
@@ -115,46 +202,42 @@ def make_app(session: Future[Session], token: str, closing: Callable[[], bool]) 
         Route("/render/stop", handlers.stop, methods=["POST"]),
         Route("/job", handlers.job, methods=["POST"]),
         Route("/result", handlers.result),
-        Route("/{name}", handlers.page_file),
+        Route("/{name}", handlers.page),
     ]
-    errors: dict[Any, Any] = {
-        StaleError: _explain(409),
-        OutputError: _explain(409),
-        InputError: _explain(422),
-        MotionTransferError: _explain(500),
-        HTTPException: _explain_status,
-        Exception: _explain(500),
-    }
+    # ours are named: what stands under Exception alone is raised again after the answer, and logged
+    kinds: Any = (HTTPException, MotionTransferError, *STATUSES)
+    errors = dict.fromkeys(kinds, _explain)
     return Starlette(routes=[Mount(f"/{token}", routes=routes)], exception_handlers=errors)
 
 
 class _Handlers:
+    """The handlers of requests; what may take long happens in other threads."""
+
     def __init__(self, session: Future[Session], closing: Callable[[], bool]) -> None:
         self._future = session
         self._closing = closing
         folder = files("motion_transfer.preview") / "page"
         self._files = {
-            file.name: file.read_bytes()
+            file.name: (file.read_bytes(), PAGE_TYPES[Path(file.name).suffix])
             for file in folder.iterdir()
-            if file.name[file.name.rfind(".") :] in PAGE_TYPES
+            if Path(file.name).suffix in PAGE_TYPES
         }
 
     async def _session(self) -> Session:
+        # shielded: a request that is given up does not cancel what the others wait for
         return await asyncio.shield(asyncio.wrap_future(self._future))
 
-    async def page(self, _request: Request) -> Response:
-        return self._file("index.html")
-
-    async def page_file(self, request: Request) -> Response:
-        return self._file(request.path_params["name"])
-
-    def _file(self, name: str) -> Response:
+    async def page(self, request: Request) -> Response:
+        """Send a file of the page."""
+        name = request.path_params.get("name", "index.html")
         if name not in self._files:  # a fixed list: no path from the page is ever opened
             raise HTTPException(404, "nothing here")
-        return Response(self._files[name], media_type=PAGE_TYPES[name[name.rfind(".") :]])
+        data, kind = self._files[name]
+        return Response(data, media_type=kind)
 
     async def events(self, _request: Request) -> Response:
-        """The state, whenever it has changed, as server-sent events."""
+        """Send the state, whenever it has changed, as server-sent events."""
+        # a proxy between, such as nginx, is told not to collect them
         return StreamingResponse(
             self._states(), media_type="text/event-stream", headers={"X-Accel-Buffering": "no"}
         )
@@ -169,19 +252,14 @@ class _Handlers:
             await asyncio.sleep(STATE_SECONDS)
 
     async def frame(self, request: Request) -> Response:
-        """A view of one frame; drawing is given up when nobody waits for it any more."""
-        view, query = request.path_params["view"], request.query_params
-        session = await self._session()
-        future = session.ask_frame(
-            request.path_params["index"],
-            view,
-            query.get("key", ""),
-            draft=query.get("draft") == "1",
-        )
+        """Send a view of one frame; it is not drawn if nobody waits for it any more."""
+        index, view = request.path_params["index"], request.path_params["view"]
+        key, draft = request.query_params.get("key", ""), request.query_params.get("draft") == "1"
+        future = (await self._session()).ask_frame(index, view, key, draft=draft)
         return await self._picture(request, future)
 
     async def still(self, request: Request) -> Response:
-        """A view of the source."""
+        """Send a view of the source."""
         future = (await self._session()).ask_still(request.path_params["view"])
         return await self._picture(request, future)
 
@@ -189,10 +267,10 @@ class _Handlers:
         waiting = asyncio.wrap_future(future)
         try:
             while not waiting.done():
-                await asyncio.wait([waiting], timeout=SHORT_PATIENCE)
+                await asyncio.wait([waiting], timeout=PATIENCE_SECONDS)
                 if not waiting.done() and await request.is_disconnected():
                     future.cancel()
-                    return Response(status_code=499)
+                    return Response(status_code=NOT_WAITED_FOR)
             data = waiting.result()
         except (CancelledError, asyncio.CancelledError):
             raise HTTPException(503, "the preview is closing") from None
@@ -219,10 +297,10 @@ class _Handlers:
         return JSONResponse(await run_in_threadpool(session.state))
 
     async def render(self, request: Request) -> Response:
-        """Begin the real run."""
-        body, session = await _body(request), await self._session()
+        """Begin the real run; 409 if its output is in the way and may not be replaced."""
+        may_replace, session = await _may_replace(request), await self._session()
         try:
-            await run_in_threadpool(session.render, replace_output=body.get("replace") is True)
+            await run_in_threadpool(session.render, replace_output=may_replace)
         except OutputError as error:
             return _in_the_way(error, session.options.output)
         return JSONResponse({}, 202)
@@ -234,17 +312,15 @@ class _Handlers:
 
     async def job(self, request: Request) -> Response:
         """Save a manifest of the run."""
-        body, session = await _body(request), await self._session()
+        may_replace, session = await _may_replace(request), await self._session()
         try:
-            text = await run_in_threadpool(
-                session.save_job, replace_file=body.get("replace") is True
-            )
+            text = await run_in_threadpool(session.save_job, replace_file=may_replace)
         except OutputError as error:
             return _in_the_way(error, session.job_file)
         return JSONResponse({"path": str(session.job_file), "text": text})
 
     async def result(self, _request: Request) -> Response:
-        """The finished video."""
+        """Send the finished video."""
         rendering = (await self._session()).rendering
         if rendering.progress.status != "done" or rendering.options is None:
             raise HTTPException(404, "nothing is rendered yet")
@@ -259,7 +335,7 @@ def _in_the_way(error: OutputError, path: Path) -> Response:
 
 
 def _window_words(value: Any) -> str:
-    """`X,Y,SIDE` of what the page sends; None is automatic."""
+    """Write `X,Y,SIDE` of what the page sends; None is automatic."""
     if value is None:
         return "auto"
     if isinstance(value, dict) and value.keys() == {"x", "y", "side"}:
@@ -268,7 +344,7 @@ def _window_words(value: Any) -> str:
 
 
 async def _body(request: Request) -> dict[str, Any]:
-    """Its size was checked before. Raises: InputError for anything but a mapping."""
+    """Read a body, whose size was checked before. Raises: InputError for any but a mapping."""
     try:
         body = await request.json()
     except ValueError:
@@ -278,16 +354,12 @@ async def _body(request: Request) -> dict[str, Any]:
     return body
 
 
-def _explain(status: int) -> Callable[[Request, Exception], Response]:
-    def answer(_request: Request, error: Exception) -> Response:
-        words = str(error) or type(error).__name__
-        if isinstance(error, StaleError):
-            words = "something has changed since; ask again with the new key"
-        return JSONResponse({"error": words}, status)
-
-    return answer
+async def _may_replace(request: Request) -> bool:
+    return (await _body(request)).get("replace") is True
 
 
-def _explain_status(_request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    return JSONResponse({"error": error.detail}, error.status_code)
+def _explain(_request: Request, error: Exception) -> Response:
+    if isinstance(error, HTTPException):
+        return JSONResponse({"error": error.detail}, error.status_code)
+    status = next(STATUSES[kind] for kind in STATUSES if isinstance(error, kind))
+    return JSONResponse({"error": str(error) or type(error).__name__}, status)

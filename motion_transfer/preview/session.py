@@ -1,4 +1,4 @@
-"""What is previewed, as it stands: options, driver, plan, pictures, and the run."""
+"""A preview as it stands: options, driver, plan, pictures, the run, and all of it as JSON."""
 
 from __future__ import annotations
 
@@ -8,36 +8,37 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
 
-from motion_transfer.errors import InputError, MotionTransferError
-from motion_transfer.media.image import encode_jpeg, encode_png
+from motion_transfer.drawing.renderers import DRAFT, RENDERERS
+from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.window import Window
+from motion_transfer.errors import InputError
+from motion_transfer.events import Event, FramesDone, Notice, Stage
+from motion_transfer.media.pictures.photo import encode_jpeg, encode_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
-from motion_transfer.preview.draw_queue import DrawQueue, StaleError
-from motion_transfer.preview.driver_look import DriverLook, open_look
-from motion_transfer.preview.frame_plans import FramePlans, plan_frames
-from motion_transfer.preview.kept import Kept
-from motion_transfer.preview.pictures import Pictures, count_people
-from motion_transfer.preview.proxies import Proxies
-from motion_transfer.preview.rendering import Rendering
-from motion_transfer.preview.words import manifest_text
-from motion_transfer.render.events import Event, FramesDone, Notice, Stage
-from motion_transfer.render.option import list_options
-from motion_transfer.render.options import RenderOptions, parse_word
-from motion_transfer.render.source import Source
+from motion_transfer.option import list_options
+from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
+from motion_transfer.preview.export import command_line, manifest_text
+from motion_transfer.preview.queue import ByteCache, DrawQueue, StaleError
+from motion_transfer.preview.rendering import Rendering, explain
+from motion_transfer.preview.views import Views, count_people, read_proxy, write_proxies
+from motion_transfer.render.composition import frame_size
+from motion_transfer.render.driver import open_driver
+from motion_transfer.render.options import DEFAULT_RATE, RenderOptions, parse_window
 
-KEPT_BYTES = 128 * 2**20
-CHANGEABLE = ("renderer", "background", "person", "driver_person", "window", "frames", "frame_rate")
-FRAME_VIEWS = ("result", "iuv", "features", "pictures")
-STILL_VIEWS = ("source", "texture", "map")
+CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's
+SHOWN_AS_IS = ("renderer", "background", "person", "driver_person")
+CHANGEABLE = (*SHOWN_AS_IS, "window", "frames", "frame_rate")
 SHARP_VIEWS = ("iuv", "texture", "map", "features")
 """Edges in them mean something: they are sent without loss."""
+
+MOST_BROKEN = 1000  # messages that are sent; a driver with more has other problems
 
 
 class Session:
@@ -52,22 +53,22 @@ class Session:
         self._weights = options.weights
         self.job_file = job_file
         self.revision = 0
-        self.look: DriverLook | None = None
+        self.driver: PreviewedDriver | None = None
         self.plans: FramePlans | None = None
         self.source: Source | None = None
         self.source_people = 0
         self.rendering = Rendering(self._touch)
-        self.pictures = Pictures()
+        self.views = Views()
         self._notices: list[str] = []
         self._errors: dict[str, str] = {}
         self._work: dict[str, Any] | None = None
-        self._queue, self._kept = DrawQueue(), Kept[bytes](KEPT_BYTES, len)
+        self._queue, self._encoded = DrawQueue(), ByteCache[bytes](CACHED_BYTES, len)
         self._lock = threading.RLock()
         self._closing = threading.Event()
         self._folder = tempfile.TemporaryDirectory(prefix="mt-preview-")
-        self._proxies: Proxies | None = None
+        self._proxies: Path | None = None
         self._queue.ask(self._find_source)
-        self._opener = threading.Thread(target=self._open, name="look")
+        self._opener = threading.Thread(target=self._open, name="driver")
         self._opener.start()
 
     def close(self) -> None:
@@ -84,7 +85,7 @@ class Session:
         return "; ".join(self._errors.values()) or None
 
     def wait_for_plan(self) -> None:
-        """Until the driver has been looked through. Raises: InputError if it cannot be used."""
+        """Wait until the driver was looked through. Raises: InputError if it cannot be used."""
         self._opener.join()
         if error := self.error:
             raise InputError(error)
@@ -92,52 +93,50 @@ class Session:
     # pictures
 
     @property
-    def has_pictures(self) -> bool:
-        """Whether the driver's own pictures can be shown."""
-        return self._proxies is not None
-
-    @property
     def key(self) -> str:
-        """Changes whenever a picture would."""
+        """A digest of what pictures of frames depend on: it changes whenever one of them would."""
         o, plans = self.options, self.plans
         drawn = (o.renderer, o.background, o.person, o.driver_person)
         planned = plans and (plans.shots, plans.exact, plans.chosen)
         return hashlib.sha256(repr((drawn, planned)).encode()).hexdigest()[:12]
 
     def ask_frame(self, index: int, view: str, key: str, *, draft: bool = False) -> Future[bytes]:
-        """A picture of a frame, encoded, in the future; cancel it if it is not wanted any more.
+        """Ask for a picture of a frame, encoded; cancel the future if it is not wanted any more.
 
         Raises: StaleError; InputError if there is no such view or frame.
         """
         with self._lock:
-            options, look, plans = self.options, self._opened(), self._planned()
-            if view not in FRAME_VIEWS:
-                raise InputError(f"view {view!r}; supported are {', '.join(FRAME_VIEWS)}")
-            if not 0 <= index < look.frame_count:
-                raise InputError(f"frame {index}; the driver has {look.frame_count}, from 0")
-            if key != self.key:
-                raise StaleError
+            options, driver, plans, current = self.options, self.driver, self.plans, self.key
+        if driver is None or plans is None:
+            doing = "opened" if driver is None else "looked at"
+            raise InputError(self.error or f"the driver is being {doing}")
         if draft:
             options = draft_of(options)
-        draft = options.renderer == "texture"
         calls: dict[str, Callable[[], np.ndarray]] = {
-            "result": lambda: self.pictures.result(options, look, plans, index),
-            "iuv": lambda: self.pictures.iuv(look, index),
-            "features": lambda: self.pictures.feature_image(options, look, plans, index),
+            "result": lambda: self.views.result(options, driver, plans, index),
+            "iuv": lambda: self.views.iuv(driver, index),
+            "features": lambda: self.views.feature_image(options, driver, plans, index),
             "pictures": lambda: self._proxy(index),
         }
+        if view not in calls:
+            raise InputError(f"view {view!r}; supported are {', '.join(calls)}")
+        if not 0 <= index < driver.frame_count:
+            raise InputError(f"frame {index}; the driver has {driver.frame_count}, from 0")
+        if key != current:
+            raise StaleError("something has changed since; ask again with the new key")
+        draft = options.renderer == DRAFT  # asked for as one, or drawn as one anyway
         return self._ask((key, view, index, draft), calls[view], view, index, draft)
 
     def ask_still(self, view: str) -> Future[bytes]:
-        """A picture of the source, as `ask_frame`."""
+        """Ask for a picture of the source, see `ask_frame`."""
         options = self.options
-        if view not in STILL_VIEWS:
-            raise InputError(f"view {view!r}; supported are {', '.join(STILL_VIEWS)}")
         calls: dict[str, Callable[[], np.ndarray]] = {
-            "source": lambda: self.pictures.source(options).photo.on_white(),
-            "texture": lambda: self.pictures.texture(options),
-            "map": lambda: self.pictures.feature_map(options),
+            "source": lambda: self.views.source(options).photo.on_white(),
+            "texture": lambda: self.views.texture(options),
+            "map": lambda: self.views.feature_map(options),
         }
+        if view not in calls:
+            raise InputError(f"view {view!r}; supported are {', '.join(calls)}")
         return self._ask((options.renderer, options.person, view), calls[view], view)
 
     def _ask(
@@ -151,32 +150,32 @@ class Session:
         encode = encode_png if view in SHARP_VIEWS else encode_jpeg
 
         def draw() -> bytes:
-            data = self._kept.get(name)  # somebody else may have asked meanwhile
+            data = self._encoded.get(name)  # somebody else may have asked meanwhile
             if data is None:
                 data = encode(call())
-                self._kept.put(name, data)
+                self._encoded.put(name, data)
             return data
 
-        kept = self._kept.get(name)
+        kept = self._encoded.get(name)
         if kept is not None:
             future: Future[bytes] = Future()
             future.set_result(kept)
             return future
         future = self._queue.ask(draw, place=index, draft=draft)
         if index >= 0:
-            future.add_done_callback(partial(self._note_broken, index))
+            future.add_done_callback(lambda _: self._note_broken(index))
         return future
 
-    def _note_broken(self, index: int, _future: Future) -> None:
-        if self.look is not None and index in self.look.broken:
+    def _note_broken(self, index: int) -> None:
+        if self.driver is not None and index in self.driver.broken:
             self._touch()
 
     def _proxy(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
-        if self.look is None or self.look.pictures is None:
+        if self.driver is None or self.driver.opened.pictures is None:
             raise InputError("the driver is IUV; it has no pictures")
         if self._proxies is None:
             raise InputError("the driver's pictures are being read; try again in a moment")
-        return self._proxies.read(index)
+        return read_proxy(self._proxies, index)
 
     # options
 
@@ -190,21 +189,22 @@ class Session:
         if unknown:
             raise InputError(f"option {unknown[0]!r}; here one can set {', '.join(CHANGEABLE)}")
         entries = {entry.name: entry for entry in list_options(RenderOptions)}
-        parsed = {name: parse_word(entries[name], value) for name, value in words.items()}
+        parsed = {name: entries[name].read(value) for name, value in words.items()}
         if "renderer" in parsed:  # weights go with the network, and come back with it
-            parsed["weights"] = None if parsed["renderer"] == "texture" else self._weights
+            row = RENDERERS.get(parsed["renderer"])  # an unknown one is refused with the others
+            parsed["weights"] = self._weights if row and row.default_weights else None
         changed = replace(self.options, **parsed)
-        if self.look is not None and self.look.pictures and "driver_person" in words:
+        if self.driver is not None and self.driver.opened.pictures and "driver_person" in words:
             raise InputError(
                 "whom to follow in raw pictures is decided when they are read; start again with"
                 f" --driver-person {changed.driver_person}"
             )
         source = None
         if "person" in words:
-            source = self._queue.ask(lambda: self.pictures.source(draft_of(changed))).result()
+            source = self._queue.ask(lambda: self.views.source(draft_of(changed))).result()
         with self._lock:  # the driver may have been looked through meanwhile
-            if self.look is not None:
-                self.plans = plan_frames(self.look, changed)
+            if self.driver is not None:
+                self.plans = plan_frames(self.driver, changed)
             self.options = changed
             self._errors.pop("plan", None)
             if source is not None:
@@ -235,80 +235,125 @@ class Session:
         return text
 
     def state(self) -> dict[str, Any]:
-        """Everything the page shows, for JSON."""
-        from motion_transfer.preview.state import describe
-
+        """Describe everything that the page shows, for JSON."""
         with self._lock:
-            return describe(self, self._work, self._notices)
+            options, driver, plans, source = self.options, self.driver, self.plans, self.source
+            opened = driver and driver.opened
+            broken = dict(driver.broken) if driver else {}  # a copy: others are writing to it
+            window = parse_window(options.window)
+            rate = options.frame_rate or (opened and opened.frame_rate) or DEFAULT_RATE
+            # of raw pictures one person is left
+            in_driver = driver.most_people if driver and not driver.opened.pictures else 0
+            return {
+                "revision": self.revision,
+                "key": self.key,
+                "options": {
+                    **{name: getattr(options, name) for name in SHOWN_AS_IS},
+                    "frames": [plans.chosen.start, plans.chosen.stop] if plans else [0, 0],
+                    "frame_rate": str(rate),
+                    "window": asdict(Window(*window)) if window else None,
+                },
+                "choices": {
+                    "renderer": list(RENDERERS),
+                    "person": _whom(self.source_people, options.person),
+                    "driver_person": _whom(in_driver, options.driver_person),
+                },
+                "source": source
+                and {
+                    "name": options.source.name,
+                    "width": source.photo.rgb.shape[1],
+                    "height": source.photo.rgb.shape[0],
+                },
+                "driver": opened
+                and {
+                    "name": opened.path.name,
+                    "frame_count": opened.frame_count,
+                    "width": opened.reader.width,
+                    "height": opened.reader.height,
+                    "frame_rate": str(opened.frame_rate or DEFAULT_RATE),
+                    "pictures": self._proxies is not None,
+                },
+                "work": self._work,
+                "planned": plans is not None and plans.exact,
+                "shots": [
+                    {"start": shot.start, "stop": shot.stop, **asdict(shot.window)}
+                    for shot in (plans.shots if plans else ())
+                ],
+                "size": self._output_size(),
+                "broken": dict(sorted(broken.items())[:MOST_BROKEN]),
+                "missing": plans.missing if plans else [],
+                "notices": self._notices,
+                "error": self.error,
+                "render": {**asdict(self.rendering.progress), "output": str(options.output)},
+                "command": command_line(options),
+                "job_file": str(self.job_file),
+                "output": str(options.output),
+            }
 
-    # the thread that looks
+    def _output_size(self) -> dict[str, int] | None:
+        if self.driver is None or self.plans is None:
+            return None
+        crop = 0
+        if self.options.size == "crop":
+            crop = self.views.working_size(self.options, self.plans.largest_side)
+        reader = self.driver.opened.reader
+        height, width = frame_size(self.options, reader.height, reader.width, crop)
+        return {"width": width, "height": height}
+
+    # the thread that looks through the driver
 
     def _open(self) -> None:
         try:
-            self.look = look = open_look(self.options, Path(self._folder.name), self._hear)
+            opened = open_driver(self.options, Path(self._folder.name), self._hear)
+            self.driver = driver = PreviewedDriver(opened)
             with suppress(InputError):  # a few frames may show nobody where others do
                 self._plan()
-            self._hear(Stage("scan", look.frame_count))
-            look.look_through(self._closing, self._looked)
+            self._hear(Stage("scan", driver.frame_count))
+            driver.see_all(self._closing, lambda count: self._hear(FramesDone(count)))
             if self._closing.is_set():
                 return
             try:
                 self._plan()
             except InputError as error:
                 self._errors["plan"] = str(error)
-            if look.pictures is not None:
+            if opened.pictures is not None:
                 folder = Path(self._folder.name) / "proxies"
-                self._proxies = Proxies.make(self.options.driver, folder, self._closing)
+                write_proxies(self.options.driver, folder, self._closing)
+                self._proxies = folder
         except _ClosingError:
             return
         except Exception as error:  # the page has to say so, whatever it was
-            self._errors["driver"] = _in_words(error)
+            self._errors["driver"] = explain(error)
         self._work = None
         self._touch()
 
     def _plan(self) -> None:
         """Plan from what is known. Raises: InputError."""
-        assert self.look is not None
+        assert self.driver is not None
         with self._lock:  # options may be changing
-            self.plans = plan_frames(self.look, self.options)
+            self.plans = plan_frames(self.driver, self.options)
         self._touch()
 
     def _find_source(self) -> None:
         try:
-            self.source = self.pictures.source(draft_of(self.options))
+            self.source = self.views.source(draft_of(self.options))
             self.source_people = count_people(self.source, self.options)
         except Exception as error:  # the page has to say so, whatever it was
-            self._errors["source"] = _in_words(error)
-        self._touch()
-
-    def _looked(self, count: int) -> None:
-        with self._lock:
-            if self._work is not None:
-                self._work = {**self._work, "done": count}
+            self._errors["source"] = explain(error)
         self._touch()
 
     def _hear(self, event: Event) -> None:
         if self._closing.is_set():
-            raise _ClosingError
+            raise _ClosingError  # the only way out of an estimate, which takes minutes
         with self._lock:
             match event:
                 case Stage():
                     self._work = {"stage": event.name, "done": 0, "total": event.frame_count}
-                case FramesDone() if self._work is not None:
-                    self._work["done"] += event.frame_count
+                case FramesDone() if (work := self._work) is not None:
+                    self._work = {**work, "done": work["done"] + event.frame_count}
                 case Notice():
                     self._notices.append(event.message)
         self._touch()
-
-    def _opened(self) -> DriverLook:
-        if self.look is None:
-            raise InputError(self.error or "the driver is being opened")
-        return self.look
-
-    def _planned(self) -> FramePlans:
-        if self.plans is None:
-            raise InputError(self.error or "the driver is being looked at")
-        return self.plans
 
     def _touch(self) -> None:
         with self._lock:
@@ -316,14 +361,14 @@ class Session:
 
 
 def draft_of(options: RenderOptions) -> RenderOptions:
-    """The same without the network: at hand within a second, and the source's texture with it."""
-    return replace(options, renderer="texture", weights=None)
+    """Take the draft renderer: at hand within a second, and the source's texture with it."""
+    return replace(options, renderer=DRAFT, weights=None)
 
 
 class _ClosingError(Exception):
     """The preview ends while the driver is being read."""
 
 
-def _in_words(error: Exception) -> str:
-    known = isinstance(error, MotionTransferError)
-    return str(error) if known else f"{type(error).__name__}: {error}"
+def _whom(count: int, current: str) -> list[str]:
+    """List whom one can choose: the largest, each of some people, and the present choice."""
+    return list(dict.fromkeys(["largest", *map(str, range(count)), current]))

@@ -6,31 +6,36 @@ import os
 import platform
 import sys
 from collections import Counter
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
+from motion_transfer.drawing.person import find_people
+from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
+from motion_transfer.drawing.renderers.network import choose_dtype
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.extra import ESTIMATE_EXTRA
-from motion_transfer.estimate.extra import missing_packages as missing_for_pictures
-from motion_transfer.estimate.iuv_weights import SHIPPED as IUV_NETWORK
-from motion_transfer.estimate.iuv_weights import has_shipped
-from motion_transfer.estimate.model_files import MODEL_FILES, is_there, models_folder
-from motion_transfer.media.image import read_photo
-from motion_transfer.media.iuv_image import CHANNEL_ORDERS, IUV_SUFFIXES
-from motion_transfer.media.iuv_stream import IuvReader, open_reader, open_stream
-from motion_transfer.people.extra import PEOPLE_EXTRA, missing_packages
-from motion_transfer.render.neural_renderer import choose_dtype
-from motion_transfer.render.person import find_people
-from motion_transfer.version import __version__
+from motion_transfer.estimate.iuv.network import SHIPPED as IUV_NETWORK
+from motion_transfer.estimate.iuv.network import has_shipped
+from motion_transfer.estimate.models import MODEL_FILES, is_there, models_folder
+from motion_transfer.extras import install_command, missing_packages
+from motion_transfer.media.iuv.formats import (
+    CHANNEL_ORDERS,
+    ChannelOrder,
+    find_iuv_format,
+    iuv_suffixes,
+)
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.media.iuv.stream import IuvStream
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES, open_pictures
+from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.media.pictures.stream import PictureStream
+from motion_transfer.version import __version__, package_version
+from motion_transfer.weights import SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import inspect_checkpoint
-from motion_transfer.weights.shipped import SHIPPED, find_weights
-from nhrr_core import PART_GROUPS, PART_NAMES, PRESETS, ModelConfig, RenderNet
-from nhrr_core.feature_net import FeatureNet
+from nhrr_core import PART_GROUPS, PART_NAMES, PRESETS, ModelConfig, NeuralReRenderer
 
 ORDER_WORDS = {
     "iuv": "iuv (file RGB = I, U, V)",
@@ -41,7 +46,7 @@ Facts = dict[str, Any]
 
 
 def describe_parts() -> Facts:
-    """Group names with their parts, then every part with its number."""
+    """Tell the names of groups with their parts, then of every part with its number."""
     return {
         "groups": {
             name: [PART_NAMES[part] for part in parts] for name, parts in PART_GROUPS.items()
@@ -51,31 +56,31 @@ def describe_parts() -> Facts:
 
 
 def describe_setup() -> Facts:
-    """Versions, device, renderers, and what a frame of each preset costs."""
+    """Tell versions, device, renderers, and what a frame of each preset costs."""
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     name = torch.cuda.get_device_name() if device.type == "cuda" else platform.processor() or "CPU"
     cores = len(os.sched_getaffinity(0))
     return {
         "motion-transfer": __version__,
         "python": sys.version.split()[0],
-        **{package: version(package) for package in PACKAGES},
+        **{package: package_version(package) for package in PACKAGES},
         "device": f"{device.type} ({name}, {cores} cores), nhrr in {choose_dtype(device)}".replace(
             "torch.", ""
         ),
         "renderers": {
-            "nhrr": "the network (default)",
-            "texture": "a draft without it",
+            name: row.summary + " (default)" * (name == DEFAULT_RENDERER)
+            for name, row in RENDERERS.items()
         },
         "raw pictures": _describe_estimators(),
-        "people": f"pip install '{PEOPLE_EXTRA}'" if missing_packages() else "installed",
+        "people": install_command("people") if missing_packages("people") else "installed",
         "weights": {name: _describe_shipped(name) for name in SHIPPED},
         "presets": {name: describe_preset(config) for name, config in PRESETS.items()},
     }
 
 
 def _describe_estimators() -> str:
-    if missing_for_pictures():
-        return f"pip install '{ESTIMATE_EXTRA}'"
+    if missing_packages("estimate"):
+        return install_command("estimate")
     folder = models_folder()
     lacking = []
     if absent := [file.name for file in MODEL_FILES if not is_there(file)]:
@@ -86,60 +91,48 @@ def _describe_estimators() -> str:
 
 
 def describe_preset(config: ModelConfig) -> Facts:
-    """Parameters, file size and arithmetic of one configuration."""
-    with torch.device("meta"):
-        feature_net = FeatureNet(
-            inputs=config.feature_inputs,
-            outputs=config.feature_outputs,
-            width=config.feature_width,
-        )
-        render_net = RenderNet(
-            inputs=config.render_inputs,
-            outputs=config.render_outputs,
-            width=config.render_width,
-            down_blocks=config.down_blocks,
-            residual_blocks=config.residual_blocks,
-            shortcut=config.geometry,
-        )
+    """Count parameters, file size and arithmetic of one configuration."""
+    with torch.device("meta"):  # shapes are enough to count: no memory, and no computing
+        model = NeuralReRenderer(config)
         flops = {}
         for side in (256, 512):
             with FlopCounterMode(display=False) as counter:
-                render_net(torch.empty(1, config.render_inputs, side, side))
+                model.render_net(torch.empty(1, config.render_inputs, side, side))
             flops[f"RenderNet GFLOP a frame at {side} x {side}"] = round(
                 counter.get_total_flops() / 1e9, 1
             )
-    counts = [sum(p.numel() for p in net.parameters()) for net in (feature_net, render_net)]
+    counts = {
+        net: sum(p.numel() for p in getattr(model, name).parameters())
+        for net, name in (("FeatureNet", "feature_net"), ("RenderNet", "render_net"))
+    }
     return {
-        "FeatureNet parameters": f"{counts[0] / 1e6:.1f} M",
-        "RenderNet parameters": f"{counts[1] / 1e6:.1f} M",
-        "weights file (fp16)": f"{sum(counts) * 2 / 1e6:.0f} MB",
+        **{f"{net} parameters": f"{count / 1e6:.1f} M" for net, count in counts.items()},
+        "weights file (fp16)": f"{sum(counts.values()) * 2 / 1e6:.0f} MB",
         **flops,
     }
 
 
 def describe_path(path: Path, order: str | None = None) -> Facts:
-    """What a file or folder holds. Raises: InputError if it is nothing that `mt` reads."""
+    """Tell what a file or folder holds. Raises: InputError if it is nothing that `mt` reads."""
     if not path.exists():
         raise InputError(f"{path} does not exist")
     if order is not None and order not in CHANNEL_ORDERS:
         raise InputError(f"channel order {order!r}; supported are {', '.join(CHANNEL_ORDERS)}")
-    if path.suffix == ".safetensors":
+    suffix = path.suffix.lower()
+    if suffix == ".safetensors":
         return _describe_weights(path)
-    if path.is_file() and path.suffix.lower() not in (*IUV_SUFFIXES, ".npy", ".npz"):
-        try:
-            return _describe_photo(path)
-        except InputError:
-            pass  # not a picture: a video, or nothing we know, which open_stream will say
-    try:
-        reader = open_reader(open_stream(path, missing="hold"), order)  # type: ignore[arg-type]
+    if path.is_dir() or find_iuv_format(path).always_iuv or suffix in VIDEO_SUFFIXES:
+        return _describe_iuv(path, order)
+    may_be_iuv = suffix in iuv_suffixes()
+    if suffix in PHOTO_SUFFIXES and not may_be_iuv:
+        return _describe_photo(path)
+    try:  # a picture that may be either, or an ending that no table knows
+        return _describe_iuv(path, order)
     except InputError as error:
-        if not path.is_file():
-            raise
         try:
-            return {**_describe_photo(path), "not IUV": str(error)}
+            return _describe_photo(path) | ({"not IUV": str(error)} if may_be_iuv else {})
         except InputError:
             raise error from None
-    return _describe_iuv(reader)
 
 
 def _describe_shipped(name: str) -> str:
@@ -164,15 +157,30 @@ def _describe_weights(path: Path) -> Facts:
 def _describe_photo(path: Path) -> Facts:
     photo = read_photo(path, "picture")
     height, width = photo.rgb.shape[:2]
-    return {
+    facts: Facts = {
         "what": "picture" + (", turned upright as its EXIF says" if photo.turned else ""),
         "size": f"{width} x {height}",
         "alpha": "no" if photo.alpha is None else "yes",
     }
+    if path.suffix.lower() in PHOTO_SUFFIXES and (clip := open_pictures(path)).frame_count > 1:
+        facts |= _describe_length(clip)
+    return facts
 
 
-def _describe_iuv(reader: IuvReader) -> Facts:
-    stream = reader.stream
+def _describe_length(stream: IuvStream | PictureStream) -> Facts:
+    facts: Facts = {"frames": stream.frame_count}
+    if stream.frame_rate:
+        seconds = float(stream.frame_count / stream.frame_rate)
+        facts["frame rate"] = f"{stream.frame_rate} ({seconds:.2f} s)"
+    if stream.notes:
+        facts["note"] = "; ".join(stream.notes)
+    return facts
+
+
+def _describe_iuv(path: Path, order: str | None) -> Facts:
+    # missing numbers are among what is told, and no reason to tell nothing
+    stream = open_stream(path, missing="hold")
+    reader = open_reader(stream, cast(ChannelOrder | None, order))
     pixels = np.zeros(len(PART_NAMES), np.int64)
     crowd: Counter[int] = Counter()
     for iuv in reader.read(0, stream.frame_count):
@@ -182,13 +190,8 @@ def _describe_iuv(reader: IuvReader) -> Facts:
         "what": stream.kind,
         "channel order": ORDER_WORDS[reader.order],
         "size": f"{reader.width} x {reader.height}",
-        "frames": stream.frame_count,
+        **_describe_length(stream),
     }
-    if stream.frame_rate:
-        seconds = float(stream.frame_count / stream.frame_rate)
-        facts["frame rate"] = f"{stream.frame_rate} ({seconds:.2f} s)"
-    if stream.notes:
-        facts["note"] = "; ".join(stream.notes)
     facts["missing numbers"] = list(stream.gaps) or "none"
     facts["people a frame"] = {f"{n} people": f"{f} frames" for n, f in sorted(crowd.items())}
     shares = pixels[1:] / max(1, pixels[1:].sum())

@@ -4,56 +4,45 @@ from __future__ import annotations
 
 import platform
 from dataclasses import asdict
-from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from motion_transfer.errors import InputError
 from motion_transfer.estimate.opening import estimator_facts
-from motion_transfer.media.formats import OutputFormat
-from motion_transfer.media.work import digest_of, key_of
-from motion_transfer.render.beside import find_iuv_beside
-from motion_transfer.render.option import list_options
-from motion_transfer.render.options import RenderOptions
+from motion_transfer.media.iuv.formats import find_iuv_of
+from motion_transfer.media.work import digest_file, key_of
+from motion_transfer.option import list_options
+from motion_transfer.render.options import (
+    EstimatorOptions,
+    InputOptions,
+    RenderOptions,
+    SourceOptions,
+)
 from motion_transfer.render.plan import Chunk, DriverPlan
-from motion_transfer.render.recipe import Recipe
-from motion_transfer.version import __version__
+from motion_transfer.version import __version__, package_version
+
+if TYPE_CHECKING:
+    from motion_transfer.drawing.renderers.interface import Recipe
+    from motion_transfer.media.output.formats import OutputFormat
 
 LIBRARIES = ("torch", "numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy")
-SAID_OTHERWISE = {
+KEYED_ELSEWHERE = {
     *("source", "source_iuv", "garments", "weights"),  # by the files' content
     *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
-    *("frames", "frame_rate"),  # likewise
+    *("frames", "frame_rate"),  # by the plan
     *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
     *("renderer", "compile", "codec", "crf"),  # by the recipe and the format
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio"),  # made when everything is drawn
 }
+"""Options that a run's key need not name. All others are in it: a new one cannot be forgotten."""
 
 
-def digest_file(path: Path, what: str) -> str:
-    """SHA-256 of a file. Raises: InputError naming what the file was wanted for."""
-    try:
-        return digest_of(path)
-    except FileNotFoundError:
-        raise InputError(f"{what} {path} does not exist") from None
-    except OSError as error:
-        raise InputError(f"{what} {path} cannot be read: {error.strerror}") from error
-
-
-def digest_weights(options: RenderOptions) -> str:
-    """SHA-256 of the checkpoint that draws; empty for a renderer without. Raises: InputError."""
-    weights = options.weights_file
-    return digest_file(weights, "weights") if weights else ""
-
-
-def source_key(options: RenderOptions, recipe: Recipe) -> str:
-    """Of everything that decides a source's appearance. Raises: InputError for a missing file."""
+def source_key(options: SourceOptions, recipe: Recipe) -> str:
+    """Compute the key of a source's appearance. Raises: InputError for a file that is missing."""
     files = [("source", options.source, options.source_iuv)]
     files += [("garment", garment.photo, garment.iuv) for garment in options.garments]
     content = []
     for what, photo, given in files:
-        iuv = given or find_iuv_beside(photo)
+        iuv = given or find_iuv_of(photo)
         content.append(digest_file(photo, what))
         content.append(digest_file(iuv, what) if iuv else _estimator_facts(options))
     return key_of(
@@ -62,7 +51,7 @@ def source_key(options: RenderOptions, recipe: Recipe) -> str:
             "parts": [garment.parts for garment in options.garments],
             "person": options.person,
             "order": options.source_iuv_order,
-            "renderer": [recipe.name, recipe.weights_digest],
+            "renderer": [recipe.name, recipe.content],
         }
     )
 
@@ -70,44 +59,46 @@ def source_key(options: RenderOptions, recipe: Recipe) -> str:
 def run_key(
     options: RenderOptions,
     *,
-    source: str,
     recipe: Recipe,
     output_format: OutputFormat,
     plan: DriverPlan,
     in_place: bool,
 ) -> str:
-    """Of everything that decides the bytes of a run's frames, but for the driver's frames."""
+    """Compute the key of a run's frames, all but the driver's own.
+
+    Raises: InputError for a file that is missing.
+    """
     drawn = {
         entry.name: getattr(options, entry.name)
         for entry in list_options(RenderOptions)
-        if entry.name not in SAID_OTHERWISE
+        if entry.name not in KEYED_ELSEWHERE
     }
     return key_of(
         {
-            "source": source,
+            "source": source_key(options, recipe),
             "options": drawn,
             "in place": in_place,
             "thumbnails": options.sheet is not None,
-            "renderer": [recipe.name, recipe.weights_digest, recipe.compile],
+            "renderer": [recipe.name, recipe.content, recipe.compiled],
             "format": [asdict(output_format), options.output.suffix.lower()],
             "shots": [asdict(shot) for shot in plan.shots],
             "rate": plan.frame_rate,
             "device": _device(),
-            "versions": [__version__, *(version(name) for name in LIBRARIES)],
+            "versions": [__version__, *(package_version(name) for name in LIBRARIES)],
         }
     )
 
 
 def chunk_key(run: str, plan: DriverPlan, chunk: Chunk) -> str:
-    """Of one chunk: its run, its driver frames, and who is followed in them."""
+    """Compute the key of a chunk: its run, its driver frames, and who is followed in them."""
     frames = plan.frames[chunk.start : chunk.stop]
     return key_of(
         {"run": run, "start": chunk.start, "frames": [[f.digest, str(f.person)] for f in frames]}
     )
 
 
-def driver_key(options: RenderOptions) -> str:
-    """Of what decides the IUV of a driver that is raw pictures. Raises: InputError."""
+def driver_key(options: InputOptions) -> str:
+    """Compute the key of the IUV of a driver that is raw pictures. Raises: InputError."""
     fitted = {"fit": _fit_facts(options)} if options.fit_body else {}
     return key_of(
         {
@@ -120,9 +111,9 @@ def driver_key(options: RenderOptions) -> str:
     )
 
 
-def _fit_facts(options: RenderOptions) -> dict[str, Any]:
-    """What decides whose proportions a driver gets."""
-    iuv = options.source_iuv or find_iuv_beside(options.source)
+def _fit_facts(options: SourceOptions) -> dict[str, Any]:
+    """List what decides whose proportions a driver gets."""
+    iuv = options.source_iuv or find_iuv_of(options.source)
     return {
         "source": digest_file(options.source, "source"),
         "iuv": digest_file(iuv, "source") if iuv else None,
@@ -131,11 +122,12 @@ def _fit_facts(options: RenderOptions) -> dict[str, Any]:
     }
 
 
-def _estimator_facts(options: RenderOptions) -> dict[str, Any]:
+def _estimator_facts(options: EstimatorOptions) -> dict[str, Any]:
     return estimator_facts(options.estimator, options.estimator_model)
 
 
 def _device() -> list[str]:
+    """Name what computes: another instruction set may round otherwise."""
     import torch
 
     if torch.cuda.is_available():

@@ -15,21 +15,25 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
+import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.drawing.canvas import Frame
+from motion_transfer.drawing.renderers.interface import Renderer
+from motion_transfer.drawing.renderers.network import one_torch_thread
+from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError, RenderError
-from motion_transfer.media.segments import open_segment
-from motion_transfer.render.canvas import Image
-from motion_transfer.render.events import FramesDone, Listener, ignore
+from motion_transfer.events import FramesDone, Listener, ignore
+from motion_transfer.media.output.segments import open_segment
+from motion_transfer.media.pictures.photo import read_photo, write_png
+from motion_transfer.render.composition import Prepared
 from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
-from motion_transfer.render.prepare import Prepared
-from motion_transfer.render.renderer import Renderer
-from motion_transfer.render.sheet import ContactSheet
-from motion_transfer.render.threads import one_torch_thread
-from motion_transfer.render.window import Window
 
 CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's batches are on the way
+
+SHEET_FRAMES, SHEET_COLUMNS = 12, 4
+THUMBNAIL_PX = 320  # the longer side: twelve of them fit a screen
 
 Pixels = UInt8[np.ndarray, "B S S 4"]
 
@@ -69,7 +73,7 @@ class Engine:
         """Render chunks, each to its path; `finished` is called, by any thread, as they complete.
 
         Args:
-            threads: that draw.
+            threads: How many draw.
         Raises: the first thread's error, after all threads have stopped.
         """
         drawers = {"core": threads, "device": 1, "nothing": 0}[self._renderer.occupies]
@@ -104,21 +108,21 @@ class Engine:
             size=self._prepared.canvas.size,
             rate=self._plan.frame_rate,
             first=chunk.start,
-        ) as segment:
+        ) as write:
             index = chunk.start
             for frames in self._render_batches(chunk):
                 for frame in frames:
-                    segment.write(frame)
+                    write(frame)
                     if self._sheet is not None:
                         self._sheet.offer(index, frame)
                     index += 1
                 self._listener(FramesDone(len(frames)))
         finished(chunk, path)
 
-    def _render_batches(self, chunk: Chunk) -> Iterator[list[Image]]:
-        """Output frames of a chunk, a batch at a time; batches begin where chunk or shot does."""
+    def _render_batches(self, chunk: Chunk) -> Iterator[list[Frame]]:
+        """Make a chunk's output frames in batches, which begin where chunk or shot does."""
         frames = self._read(chunk)
-        on_their_way: deque[Callable[[], list[Image]]] = deque()
+        on_their_way: deque[Callable[[], list[Frame]]] = deque()
         for shot in self._plan.shots_in(chunk):
             for start in range(shot.start, shot.stop, self._renderer.batch_size):
                 count = min(self._renderer.batch_size, shot.stop - start)
@@ -132,10 +136,11 @@ class Engine:
             yield finish()
 
     def _begin_batch(
-        self, batch: list[Image], start: int, window: Window
-    ) -> Callable[[], list[Image]]:
-        """Have driver frames drawn, the first of which makes frame `start`; what waits for it."""
+        self, batch: list[Frame], start: int, window: Window
+    ) -> Callable[[], list[Frame]]:
+        """Have driver frames drawn, which make frames from `start` on; give what waits for it."""
         size = self._renderer.working_size(window.side)
+        # padded to full batches: what one frame looks like must not depend on its neighbours
         crops = np.zeros((self._renderer.batch_size, size, size, 3), np.uint8)
         for slot, iuv in enumerate(batch):
             crops[slot] = window.cut(iuv, size)
@@ -146,13 +151,13 @@ class Engine:
 
     def _finish_batch(
         self,
-        batch: list[Image],
+        batch: list[Frame],
         start: int,
         window: Window,
         crops: UInt8[np.ndarray, "B S S 3"],
         drawn: Callable[[], Pixels],
-    ) -> list[Image]:
-        """Output frames of a batch."""
+    ) -> list[Frame]:
+        """Wait for a batch and lay out its output frames."""
         canvas = self._prepared.canvas
         try:
             results = drawn()
@@ -167,8 +172,8 @@ class Engine:
             for iuv, crop, rgba in zip(batch, crops, results, strict=False)
         ]
 
-    def _read(self, chunk: Chunk) -> Iterator[Image]:
-        """The IUV frames that the chunk shows, with only the followed person in them."""
+    def _read(self, chunk: Chunk) -> Iterator[Frame]:
+        """Read the IUV frames that the chunk shows, with only the followed person in them."""
         first = self._plan.first
         frames = self._reader.read(first + chunk.start, first + chunk.stop)
         plans = self._plan.frames[chunk.start : chunk.stop]
@@ -184,3 +189,31 @@ class Engine:
                     " start again when it is complete"
                 )
             yield plan.isolate(shown)
+
+
+class ContactSheet:
+    """Collects thumbnails of evenly spread frames in a folder, from any thread or process."""
+
+    def __init__(self, folder: Path, frame_count: int) -> None:
+        count = min(SHEET_FRAMES, frame_count)
+        self._folder = folder
+        self._wanted = {int(index) for index in np.linspace(0, frame_count - 1, count).round()}
+
+    def offer(self, index: int, frame: UInt8[np.ndarray, "H W 3"]) -> None:
+        """Keep a frame if it is one of the wanted; in any order."""
+        if index in self._wanted:
+            scale = min(1, THUMBNAIL_PX / max(frame.shape[:2]))
+            size = (max(1, round(frame.shape[1] * scale)), max(1, round(frame.shape[0] * scale)))
+            write_png(self._path(index), cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
+
+    def picture(self) -> UInt8[np.ndarray, "H W 3"]:
+        """Lay out the sheet; every wanted frame must have been offered."""
+        images = [read_photo(self._path(index)).rgb for index in sorted(self._wanted)]
+        blank = np.full_like(images[0], 255)
+        columns = min(SHEET_COLUMNS, len(images))
+        images += [blank] * (-len(images) % columns)
+        rows = [np.hstack(images[i : i + columns]) for i in range(0, len(images), columns)]
+        return np.vstack(rows)
+
+    def _path(self, index: int) -> Path:
+        return self._folder / f"thumbnail_{index:06d}.png"

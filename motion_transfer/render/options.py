@@ -1,4 +1,8 @@
-"""What one run is: a source, a driver, an output, and how to get from one to the other."""
+"""What one run is: a source, a driver, an output, and how to get from one to the other.
+
+Every option is described once, here. A function that reads some of them takes the part that it
+reads: `RenderOptions` is each of its parts.
+"""
 
 from __future__ import annotations
 
@@ -7,28 +11,33 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import ClassVar
 
+from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS, RendererRow
 from motion_transfer.errors import InputError
-from motion_transfer.render.option import REQUIRED, Option, list_options, option
-from motion_transfer.weights.shipped import DEFAULT_WEIGHTS, find_weights
+from motion_transfer.estimate.opening import ESTIMATORS, check_estimator
+from motion_transfer.media.iuv.formats import (
+    CHANNEL_ORDERS,
+    DRIVER_KINDS,
+    MISSING,
+    ChannelOrder,
+    DriverKind,
+    Missing,
+    driver_help,
+)
+from motion_transfer.option import REQUIRED, check_choices, option, parse_colour
 
-if TYPE_CHECKING:  # help has to be instant, and these need the libraries that do the work
-    from motion_transfer.media.driver_kind import DriverKind
-    from motion_transfer.media.iuv_image import ChannelOrder
-    from motion_transfer.media.iuv_stream import Missing
-
-CHANNEL_ORDERS = ("iuv", "vui")
-MISSING = ("hold", "background", "fail")
-RENDERERS = ("nhrr", "texture")
-ESTIMATORS = ("blazepose", "densepose")
-DRIVER_KINDS = ("iuv", "pictures")
 NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
 SMALLEST_WINDOW, LARGEST_WINDOW = 16, 16384
+"""Sides, px: a smaller window shows nobody, a larger one takes the memory of a whole machine."""
+
 DEFAULT_RATE = Fraction(30)
-LONGEST_RATE_TERM = 2**31 - 1  # what FFmpeg's fractions hold
-RATE_DENOMINATOR = 100_000
+
+
+def _described(row: RendererRow) -> str:
+    default = "; default" if row.name == DEFAULT_RENDERER else ""
+    return f"{row.name} ({row.summary}{default})"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,18 +49,40 @@ class Garment:
     iuv: Path | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class RenderOptions:
-    """The options of a run: what `mt run` takes, what a manifest's jobs may set, and its defaults.
+class _Part:
+    """Some options; checked when they are made."""
 
-    Paths of drivers may name a motion, `people:walk` (see `people.stream`). The IUV of photos and
-    drivers that come without one is estimated; `driver_kind` None finds out which do. `frames` is a
-    half-open range of the driver's frames, either end open. `weights` may name a checkpoint that
-    ships, and None is the default one; a `frame_rate` of None is the driver's own, or 30; `audio`
-    None is its own if it has one; `missing` None fails for numbers missing from a folder, and shows
-    background where nobody is found. Nothing here but the content of the inputs and what is drawn
-    decides the output's bytes: `workers` never does.
-    """
+    def __post_init__(self) -> None:
+        check_choices(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EstimatorOptions(_Part):
+    """Who finds the people of pictures that come without IUV."""
+
+    estimator: str = option(
+        "--estimator",
+        "Raw pictures",
+        "blazepose (default; needs `mt models fetch`, once), or densepose, with its model.",
+        default="blazepose",
+        choices=tuple(ESTIMATORS),
+    )
+    estimator_model: Path | None = option(
+        "--estimator-model",
+        "Raw pictures",
+        "DensePose, TorchScript or .onnx. A TorchScript file is a program: it is run.",
+        kind="path",
+        metavar="FILE",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_estimator(self.estimator, self.estimator_model, model_flag="--estimator-model")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceOptions(EstimatorOptions):
+    """Who is drawn, and in whose clothes."""
 
     source: Path = option(
         "--source", "Source", "Photo of the person.", kind="path", default=REQUIRED
@@ -76,11 +107,29 @@ class RenderOptions:
         choices=CHANNEL_ORDERS,
         metavar="ORDER",
     )
+    garments: tuple[Garment, ...] = option(
+        "--garment --garment-parts",
+        "Garment transfer",
+        "Take parts from this photo; may be repeated, each with its --garment-parts.",
+        kind="garments",
+        default=(),
+        parse=lambda written: tuple(map(read_garment, written)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriverOptions(EstimatorOptions):
+    """Whose motion it is.
+
+    The path may name a motion, `people:walk` (see `motion_transfer.people`). `driver_kind` None
+    finds out whether it is IUV. `frames` is a half-open range, either end open. `missing` None
+    fails for numbers missing from a folder, and shows background where nobody is found.
+    """
+
     driver: Path = option(
         "--driver",
         "Driver",
-        "A video or pictures of a person; or IUV: a folder of images, one image, lossless video,"
-        " .npy, .npz, detectron2's results.pkl; or people:MOTION (such as people:walk,frames=60;"
+        f"A video or pictures of a person; or IUV: {driver_help()} (such as people:walk,frames=60;"
         " see `mt people drive -h`).",
         kind="path",
         default=REQUIRED,
@@ -128,20 +177,16 @@ class RenderOptions:
         default=(None, None),
         metavar="A:B",
     )
-    estimator: str = option(
-        "--estimator",
-        "Raw pictures",
-        "blazepose (default; needs `mt models fetch`, once), or densepose, with its model.",
-        default="blazepose",
-        choices=ESTIMATORS,
-    )
-    estimator_model: Path | None = option(
-        "--estimator-model",
-        "Raw pictures",
-        "DensePose, TorchScript or .onnx. A TorchScript file is a program: it is run.",
-        kind="path",
-        metavar="FILE",
-    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parse_window(self.window)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputOptions(DriverOptions, SourceOptions):
+    """Everything that goes in: a driver may be fitted to the source's body."""
+
     fit_body: bool = option(
         "--fit-body",
         "Raw pictures",
@@ -149,19 +194,27 @@ class RenderOptions:
         kind="flag",
         default=False,
     )
-    garments: tuple[Garment, ...] = option(
-        "--garment --garment-parts",
-        "Garment transfer",
-        "Take parts from this photo; may be repeated, each with its --garment-parts.",
-        kind="garments",
-        default=(),
-    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_estimator(
+            self.estimator,
+            self.estimator_model,
+            model_flag="--estimator-model",
+            fit=self.fit_body,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RendererOptions(_Part):
+    """What draws. `weights` may name a checkpoint that ships; None is the renderer's default."""
+
     renderer: str = option(
         "--renderer",
         "Rendering",
-        "nhrr (the network; default) or texture (a draft without it, faster).",
-        default="nhrr",
-        choices=RENDERERS,
+        " or ".join(map(_described, RENDERERS.values())) + ".",
+        default=DEFAULT_RENDERER,
+        choices=tuple(RENDERERS),
         metavar="NAME",
     )
     weights: Path | None = option(
@@ -170,25 +223,34 @@ class RenderOptions:
         "Checkpoint for nhrr, safetensors; default: lite, which ships.",
         kind="path",
     )
+    compile: bool | None = option(
+        "--compile/--no-compile",
+        "Rendering",
+        "Compile the network first; default: for drivers of 300 frames and more.",
+        kind="switch",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.weights is not None and RENDERERS[self.renderer].default_weights is None:
+            raise InputError(f"the {self.renderer} renderer uses no weights; leave out --weights")
+
+    @property
+    def weights_files(self) -> list[Path]:
+        """The files that it draws with, if any. Raises: WeightsError."""
+        return RENDERERS[self.renderer].files(self.weights)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions(_Part):
+    """What comes out. A `frame_rate` of None is the driver's, or 30; `audio` None is its own."""
+
     background: str = option(
         "--background",
         "Rendering",
         "white (default), black, #rrggbb, or photo (the source's, painted over behind the person).",
         default="white",
         metavar="COLOUR",
-    )
-    workers: int | None = option(
-        "--workers",
-        "Rendering",
-        "Threads; default: one for each core.",
-        kind="integer",
-        in_manifest=False,
-    )
-    compile: bool | None = option(
-        "--compile/--no-compile",
-        "Rendering",
-        "Compile the network first; default: for drivers of 300 frames and more.",
-        kind="switch",
     )
     output: Path = option(
         "-o --output",
@@ -246,60 +308,57 @@ class RenderOptions:
     )
 
     def __post_init__(self) -> None:
-        for entry in list_options(RenderOptions):
-            value = getattr(self, entry.name)
-            if entry.choices and value != entry.default and value not in entry.choices:
-                listed = ", ".join(entry.choices)
-                raise InputError(f"{entry.name} is {value!r}; supported are {listed}")
-        if self.renderer == "texture" and self.weights is not None:
-            raise InputError("the texture renderer uses no weights; leave out --weights")
-        if self.estimator == "densepose" and self.estimator_model is None:
-            raise InputError("the densepose estimator needs --estimator-model FILE; none ships")
-        if self.estimator != "densepose" and self.estimator_model is not None:
-            raise InputError(
-                "--estimator-model is for the densepose estimator; add --estimator densepose"
-            )
-        if self.fit_body and self.estimator != "blazepose":
-            raise InputError(
-                f"--fit-body compares landmarks, and the {self.estimator} estimator gives none;"
-                " choose the blazepose estimator, or leave out --fit-body"
-            )
+        super().__post_init__()
+        parse_colour(self.background)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderOptions(OutputOptions, RendererOptions, InputOptions):
+    """The options of a run: what `mt run` takes, what a manifest's jobs may set, and its defaults.
+
+    Nothing here but the content of the inputs and what is drawn decides the output's bytes:
+    `workers` never does.
+    """
+
+    SECTIONS: ClassVar = (
+        "Source",
+        "Driver",
+        "Raw pictures",
+        "Garment transfer",
+        "Rendering",
+        "Output",
+    )
+
+    workers: int | None = option(
+        "--workers",
+        "Rendering",
+        "Threads; default: one for each core.",
+        kind="integer",
+        in_manifest=False,
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if self.workers is not None and self.workers < 1:
             raise InputError(f"workers is {self.workers}; it must be at least 1")
-        parse_colour(self.background)
-        parse_window(self.window)
-
-    @property
-    def weights_file(self) -> Path | None:
-        """The checkpoint that draws; None for a renderer without one. Raises: WeightsError."""
-        if self.renderer == "texture":
-            return None
-        return find_weights(self.weights or DEFAULT_WEIGHTS)
 
     @property
     def worker_count(self) -> int:
+        """How many threads to use: as many as asked for, or one for each core that may be used."""
         return self.workers or len(os.sched_getaffinity(0))
 
 
-def parse_colour(background: str) -> tuple[int, int, int] | None:
-    """RGB of `white`, `black` or `#rrggbb`; None for `photo`. Raises: InputError."""
-    named = {"white": "#ffffff", "black": "#000000"}
-    text = named.get(background, background)
-    if text == "photo":
-        return None
-    try:
-        if len(text) != 7 or text[0] != "#":
-            raise ValueError
-        red, green, blue = bytes.fromhex(text[1:])
-    except ValueError:
-        raise InputError(
-            f"background {background!r}; supported are white, black, photo and #rrggbb"
-        ) from None
-    return red, green, blue
+def read_garment(written: Mapping[str, str]) -> Garment:
+    """Read a garment from a mapping with `photo`, `parts` and perhaps `iuv`. Raises: InputError."""
+    return Garment(
+        photo=Path(written["photo"]),
+        iuv=Path(written["iuv"]) if written.get("iuv") else None,
+        parts=parse_parts(written["parts"]),
+    )
 
 
 def parse_window(text: str) -> tuple[int, int, int] | None:
-    """x, y and side, px, of `X,Y,SIDE`; None for `auto`. Raises: InputError."""
+    """Read x, y and side, px, of `X,Y,SIDE`; None for `auto`. Raises: InputError."""
     if text == "auto":
         return None
     try:
@@ -313,44 +372,8 @@ def parse_window(text: str) -> tuple[int, int, int] | None:
     return x, y, side
 
 
-def parse_frames(text: str) -> tuple[int | None, int | None]:
-    """`10:50`, `10:`, `:50` or `12` as a half-open range. Raises: InputError."""
-    return parse_range(text, "frames")
-
-
-def parse_range(text: str, what: str) -> tuple[int | None, int | None]:
-    """A half-open range of what is counted from 0, either end open. Raises: InputError."""
-    try:
-        if ":" not in text:
-            return int(text), int(text) + 1
-        start, stop = text.split(":")
-        ends = int(start) if start else None, int(stop) if stop else None
-    except ValueError:
-        raise InputError(f"{what} {text!r}; write START:STOP, such as 10:50, 10: or :50") from None
-    if any(end is not None and end < 0 for end in ends):
-        raise InputError(f"{what} {text!r}; {what} count from 0 and never from the end")
-    return ends
-
-
-def parse_rate(text: str) -> Fraction:
-    """`25`, `29.97` or `30000/1001`. Raises: InputError."""
-    try:
-        rate = Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        raise InputError(
-            f"fps {text!r}; write a number or a fraction, such as 30000/1001"
-        ) from None
-    if not 0 < rate <= 1000:
-        raise InputError(f"fps {text!r}; it must lie between 0 and 1000")
-    if max(rate.numerator, rate.denominator) > LONGEST_RATE_TERM:
-        rate = rate.limit_denominator(RATE_DENOMINATOR)  # 29.97002997002997 is 30000/1001
-    if not rate:
-        raise InputError(f"fps {text!r}; it is too slow for a video")
-    return rate
-
-
 def parse_parts(text: str) -> tuple[int, ...]:
-    """Part numbers of a comma-separated list of part or group names. Raises: InputError."""
+    """Read a comma-separated list of part or group names as part numbers. Raises: InputError."""
     from nhrr_core.iuv import PART_GROUPS, PART_NAMES
 
     names = {name: (index,) for index, name in enumerate(PART_NAMES) if index}
@@ -366,38 +389,3 @@ def parse_parts(text: str) -> tuple[int, ...]:
     if not parts:
         raise InputError("no parts named; write some, such as torso,upper-legs")
     return tuple(sorted(parts))
-
-
-def parse_word(entry: Option, value: Any) -> Any:
-    """A value as the command line or a manifest writes it, as the field of `RenderOptions`.
-
-    Garments are mappings with `photo`, `parts` and, if wanted, `iuv`. Raises: InputError.
-    """
-    if value is None:
-        return entry.default
-    if entry.kind == "path":
-        return Path(value)
-    if entry.kind == "rate":
-        return parse_rate(str(value))
-    if entry.kind == "frames":
-        return parse_frames(str(value))
-    if entry.kind == "garments":
-        return tuple(
-            Garment(
-                photo=Path(garment["photo"]),
-                iuv=Path(garment["iuv"]) if garment.get("iuv") else None,
-                parts=parse_parts(garment["parts"]),
-            )
-            for garment in value
-        )
-    if entry.name == "background":
-        parse_colour(value)
-    return value
-
-
-def options_from_words(words: Mapping[str, Any]) -> RenderOptions:
-    """Options from what was written, by field name. Raises: InputError for a value that is none."""
-    entries = {entry.name: entry for entry in list_options(RenderOptions)}
-    return RenderOptions(
-        **{name: parse_word(entries[name], value) for name, value in words.items()}
-    )

@@ -1,6 +1,7 @@
 """Drivers that are raw pictures: their IUV is found once, and kept as a lossless video.
 
 The engine then reads that video as any other driver: in chunks, in parallel, again after a crash.
+With `--fit-body` the driver's body gets the source's proportions on the way.
 """
 
 from __future__ import annotations
@@ -13,20 +14,35 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from motion_transfer.estimate.clip import ClipSummary, estimate_clip
+from motion_transfer.drawing.person import Follower, bounding_box
+from motion_transfer.drawing.source import read_person
+from motion_transfer.errors import InputError
+from motion_transfer.estimate.blazepose.retarget import (
+    BodyFit,
+    compare_proportions,
+    measure_proportions,
+)
+from motion_transfer.estimate.clip import ClipSummary, estimate_clip, follow_landmarks
+from motion_transfer.estimate.interface import Landmarks, PersonEstimate
 from motion_transfer.estimate.opening import open_estimator
-from motion_transfer.media.iuv_image import ChannelOrder
-from motion_transfer.media.iuv_writing import IuvFormat, write_iuv
-from motion_transfer.media.picture_stream import open_pictures
+from motion_transfer.events import FramesDone, Listener, Notice, Stage
+from motion_transfer.media.iuv.formats import ChannelOrder, find_iuv_of
+from motion_transfer.media.iuv.writing import IuvOutput, write_iuv
+from motion_transfer.media.pictures.formats import open_pictures
+from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.media.publish import publish
 from motion_transfer.media.work import digest_of
-from motion_transfer.render.body_match import match_body
 from motion_transfer.render.content import driver_key
-from motion_transfer.render.events import FramesDone, Listener, Notice, Stage
-from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.options import InputOptions, SourceOptions
 from motion_transfer.render.plan import frame_range
 
 ORDER: ChannelOrder = "iuv"
+"""Of the channels of the video that is kept."""
+
+MEASURED_FRAMES = 60
+"""Of the driver: the first ones that show its person. Two seconds hold several poses; a single
+picture says a bone's length to no better than a tenth."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +50,13 @@ class PictureDriver:
     """The IUV of one person in a clip, fitted to a source's proportions if that was asked for.
 
     Attributes:
-        iuv: the lossless video; as long as the clip, or as its used beginning.
-        digest: of that file; hexadecimal.
-        key: of the content it was made from.
-        frame_rate: the clip's own, if it has one.
-        start_seconds: where the first frame stands on the clock of the clip's sound.
-        cuts: the frames with which shots begin.
-        notes: what the user should know of how the clip was read.
+        iuv: The lossless video; as long as the clip, or as its used beginning.
+        digest: SHA-256 of that file, hexadecimal.
+        key: Of the content that it was made from.
+        frame_rate: The clip's own, if it has one.
+        start_seconds: Where the first frame stands on the clock of the clip's sound.
+        cuts: The frames with which shots begin.
+        notes: What the user should know of how the clip was read.
     """
 
     iuv: Path
@@ -52,11 +68,11 @@ class PictureDriver:
     notes: tuple[str, ...]
 
 
-def estimate_driver(options: RenderOptions, folder: Path, listener: Listener) -> PictureDriver:
-    """The IUV of a driver's person, from an earlier run if its content is the same.
+def estimate_driver(options: InputOptions, folder: Path, listener: Listener) -> PictureDriver:
+    """Find the IUV of a driver's person, or take that of an earlier run of the same content.
 
     Args:
-        folder: where the result is kept.
+        folder: Where the result is kept.
     Raises: InputError if nobody is found, or what it takes to look is missing.
     """
     key = driver_key(options)
@@ -71,10 +87,10 @@ def estimate_driver(options: RenderOptions, folder: Path, listener: Listener) ->
     return driver
 
 
-def _make(options: RenderOptions, iuv: Path, key: str, listener: Listener) -> PictureDriver:
+def _make(options: InputOptions, iuv: Path, key: str, listener: Listener) -> PictureDriver:
     pictures = open_pictures(options.driver)
     chosen = frame_range(options.frames, pictures.frame_count, str(options.driver))
-    fit = match_body(options, pictures, chosen, listener) if options.fit_body else None
+    fit = _match_body(options, pictures, chosen, listener) if options.fit_body else None
     estimator = open_estimator(
         options.estimator, options.estimator_model, frame_rate=pictures.frame_rate, fit=fit
     )
@@ -85,7 +101,7 @@ def _make(options: RenderOptions, iuv: Path, key: str, listener: Listener) -> Pi
     )
     written = _temporary(iuv)
     iuv.parent.mkdir(parents=True, exist_ok=True)
-    settings = IuvFormat(
+    settings = IuvOutput(
         frame_count=chosen.stop, height=pictures.height, width=pictures.width, order=ORDER
     )
     with closing(frames):
@@ -103,8 +119,53 @@ def _make(options: RenderOptions, iuv: Path, key: str, listener: Listener) -> Pi
     )
 
 
+def _match_body(
+    options: InputOptions, pictures: PictureStream, chosen: range, listener: Listener
+) -> BodyFit:
+    """Find what brings the driver's person to the source's proportions, once for the whole clip.
+
+    It is measured before the clip is estimated: the first frames are fitted as the last are.
+    Raises: InputError if either shows nobody, or they show too little in common.
+    """
+    source = measure_proportions([_source_landmarks(options)])
+    estimator = open_estimator(
+        options.estimator, options.estimator_model, frame_rate=pictures.frame_rate
+    )
+    listener(Stage("compare", min(MEASURED_FRAMES, len(chosen))))
+    seen = follow_landmarks(
+        pictures,
+        estimator,
+        person=options.driver_person,
+        chosen=chosen,
+        count=MEASURED_FRAMES,
+        done=lambda count: listener(FramesDone(count)),
+    )
+    return compare_proportions(source, measure_proportions(seen))
+
+
+def _source_landmarks(options: SourceOptions) -> Landmarks:
+    """Find the landmarks of the source's person, also where its IUV says who that is."""
+    photo = read_photo(options.source)
+    iuv_path = options.source_iuv or find_iuv_of(options.source)
+    choice = options.person
+    if iuv_path is not None:
+        iuv = read_person(photo, iuv_path, choice, options.source_iuv_order, "source")
+        box = bounding_box(iuv)
+        if box.area:
+            choice = f"{box.left},{box.top},{box.right},{box.bottom}"
+    estimator = open_estimator(options.estimator, options.estimator_model)
+    people = estimator.estimate(photo.on_white())
+    chosen = Follower[PersonEstimate](choice).pick(people, f"source {options.source}")
+    if not chosen or chosen[0].landmarks is None:
+        raise InputError(
+            f"--fit-body: no landmarks of a person were found in the source {options.source}; give"
+            " a photo that shows one, or leave out --fit-body"
+        )
+    return chosen[0].landmarks
+
+
 def _read(iuv: Path, facts: Path, key: str) -> PictureDriver | None:
-    """What an earlier run made of the same content, if it is there and whole."""
+    """Read what an earlier run made of the same content, if it is there and whole."""
     try:
         told: dict[str, Any] = json.loads(facts.read_text())
         if told["key"] != key or digest_of(iuv) != told["digest"]:
@@ -133,5 +194,5 @@ def _write(driver: PictureDriver, facts: Path) -> None:
 
 
 def _temporary(path: Path) -> Path:
-    """A name that a killed run may leave behind: a work folder sweeps it away."""
+    """Make a name that a killed run may leave behind: a work folder sweeps it away."""
     return path.with_name(f"{path.stem}.part-{uuid.uuid4().hex[:8]}{path.suffix}")

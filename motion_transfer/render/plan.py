@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Protocol
@@ -13,29 +13,23 @@ import numpy as np
 from jaxtyping import UInt8
 from xxhash import xxh3_128_hexdigest
 
-from motion_transfer.errors import InputError
-from motion_transfer.media.iuv_stream import IuvReader, Missing
-from motion_transfer.media.stream import IuvStream
-from motion_transfer.render.missing import (
-    FramePlan,
-    hold_frames,
-    list_stretches,
-    missing_stretches,
-)
-from motion_transfer.render.person import (
+from motion_transfer.drawing.person import (
+    Follower,
     People,
     Person,
-    choose_person,
     find_people,
-    follow,
-    take_as_one,
+    isolate,
 )
-from motion_transfer.render.window import Window, plan_window
+from motion_transfer.drawing.window import Window, plan_window
+from motion_transfer.errors import InputError
+from motion_transfer.media.iuv.formats import Missing
+from motion_transfer.media.iuv.stream import IuvReader, IuvStream
 
 CHUNK_FRAMES = 48
 """Cut points are multiples of this, whatever the number of workers: they decide the bytes."""
 
-SCAN_FRAMES = 16
+SCAN_FRAMES = 16  # a thread reads at a time: seeking in a video costs the decoding of several
+LISTED_STRETCHES = 10
 
 
 class FrameReader(Protocol):
@@ -50,8 +44,32 @@ class FrameReader(Protocol):
 
 
 def digest_of_iuv(iuv: UInt8[np.ndarray, "H W 3"]) -> str:
-    """Of a frame's content, hexadecimal: tells changes by accident, which take no cryptography."""
+    """Compute a digest of a frame, hexadecimal.
+
+    It tells changes by accident, which take no cryptography.
+    """
     return xxh3_128_hexdigest(np.ascontiguousarray(iuv).data)
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """Who is rendered in one frame: nobody (None), or a person, alone in it or to be isolated.
+
+    Attributes:
+        digest: Of the IUV of the frame that is shown, everybody in it included; hexadecimal.
+        held: The driver's frame that is shown because nobody was found in this one; else None.
+    """
+
+    person: Person | None
+    alone: bool
+    digest: str = ""
+    held: int | None = None
+
+    def isolate(self, iuv: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
+        """Leave nobody but the person in the IUV of the frame that is shown."""
+        if self.alone:
+            return iuv
+        return np.zeros_like(iuv) if self.person is None else isolate(iuv, self.person)
 
 
 @dataclass(frozen=True)
@@ -85,9 +103,9 @@ class DriverPlan:
     """What the engine needs to know of a driver.
 
     Attributes:
-        first: the driver's frame that becomes output frame 0.
-        frames: one entry for each output frame.
-        shots: one after the other, they cover the frames.
+        first: The driver's frame that becomes output frame 0.
+        frames: One entry for each output frame.
+        shots: One after the other, they cover the frames.
     """
 
     first: int
@@ -96,7 +114,7 @@ class DriverPlan:
     frame_rate: Fraction
 
     def shots_in(self, chunk: Chunk) -> Iterator[Shot]:
-        """The pieces of shots that a chunk shows."""
+        """List the pieces of shots that a chunk shows."""
         for shot in self.shots:
             start, stop = max(shot.start, chunk.start), min(shot.stop, chunk.stop)
             if start < stop:
@@ -104,7 +122,7 @@ class DriverPlan:
 
     @property
     def largest_side(self) -> int:
-        """Of the windows, px."""
+        """The largest window's side, px."""
         return max(shot.window.side for shot in self.shots)
 
     @property
@@ -117,12 +135,12 @@ class DriverPlan:
 
     @property
     def missing(self) -> list[tuple[int, int]]:
-        """Half-open ranges of driver frames in which the person was not found."""
+        """List half-open ranges of driver frames in which the person was not found."""
         return missing_stretches(self.frames, self.first)
 
 
 def frame_range(frames: tuple[int | None, int | None], count: int, where: str) -> range:
-    """The driver's frames that a run uses. Raises: InputError if it has none of them."""
+    """Tell the driver's frames that a run uses. Raises: InputError if it has none of them."""
     start, stop = frames[0] or 0, count if frames[1] is None else frames[1]
     if not 0 <= start < stop <= count:
         raise InputError(
@@ -137,14 +155,13 @@ def scan_people(
     workers: int,
     done: Callable[[int], None],
     *,
-    one_person: bool = False,
+    find: Callable[[UInt8[np.ndarray, "H W 3"]], People] = find_people,
 ) -> list[SeenFrame]:
-    """Everybody in each frame, decoded in parallel; nothing but boxes and digests is kept.
+    """Find everybody in each frame, decoded in parallel; only boxes and digests are kept.
 
     Args:
-        one_person: whatever is in a frame belongs to one person, as whoever made it says.
+        find: Finds the people of a frame.
     """
-    find = take_as_one if one_person else find_people
 
     def scan(start: int) -> list[SeenFrame]:
         block = range(start, min(start + SCAN_FRAMES, frames.stop))
@@ -203,13 +220,11 @@ def plan_path(
         )
     ends = [0, *(cut - chosen.start for cut in cuts if chosen.start < cut < chosen.stop)]
     ranges = list(pairwise([*ends, len(people)]))
-    path: list[Person | None] = []
-    for start, stop in ranges:
-        path += _path_in_shot(people[start:stop], person, where_found, strict=not any(path))
+    path = _follow(people, [start for start, _ in ranges], person, where_found)
     plans = tuple(
         FramePlan(
             who,
-            alone=who is not None and len(who.regions) == frame.people.region_count,
+            alone=who is not None and frame.people.shows_only(who),
             digest=frame.digest,
         )
         for who, frame in zip(path, seen, strict=True)
@@ -229,33 +244,88 @@ def plan_path(
     return DriverPlan(chosen.start, plans, shots, frame_rate)
 
 
-def _path_in_shot(
-    people: Sequence[People], person: str | None, where: str, *, strict: bool
+def _follow(
+    people: Sequence[People], shots: Sequence[int], person: str | None, where: str
 ) -> list[Person | None]:
-    """The chosen person in every frame of a shot; `strict`: nobody else will do."""
+    """Follow the chosen person; `shots` are the frames that shots begin with."""
     if person is None:
         return [frame.persons[0] if frame.persons else None for frame in people]
-    found = next((i for i, frame in enumerate(people) if frame.persons), None)
-    if found is None:
-        return [None] * len(people)
-    try:
-        first = choose_person(people[found], person, where)
-    except InputError:
-        if strict:
-            raise
-        first = people[found].persons[0]
-    return [None] * found + follow(people[found:], first)
+    follower = Follower[Person](person)
+    path: list[Person | None] = []
+    for index, frame in enumerate(people):
+        if index in shots:
+            follower.start_shot()
+        path += follower.pick(frame.persons, where) or [None]
+    return path
 
 
 def _lay_windows(plans: Sequence[FramePlan], ranges: Sequence[tuple[int, int]]) -> tuple[Shot, ...]:
-    """A window for each shot; one without anybody is drawn in its neighbour's."""
-    windows = [
-        plan_window(path) if any(path := [plan.person for plan in plans[start:stop]]) else None
-        for start, stop in ranges
-    ]
+    """Lay a window for each shot; one without anybody is drawn in its neighbour's."""
+    windows = [_window_of(plans[start:stop]) for start, stop in ranges]
     last = next(window for window in windows if window is not None)
     shots = []
     for (start, stop), window in zip(ranges, windows, strict=True):
         last = window or last
         shots.append(Shot(start, stop, last))
     return tuple(shots)
+
+
+def _window_of(plans: Sequence[FramePlan]) -> Window | None:
+    boxes = [plan.person.box for plan in plans if plan.person is not None]
+    return plan_window(boxes) if boxes else None
+
+
+def hold_frames(frames: Sequence[FramePlan], first: int) -> tuple[FramePlan, ...]:
+    """Let frames without anybody show the last one with somebody, or the first if none was yet.
+
+    Args:
+        first: the driver's frame that `frames[0]` plans. Somebody is in at least one frame.
+    """
+    index = next(i for i, frame in enumerate(frames) if frame.person is not None)
+    held = []
+    for number, frame in enumerate(frames):
+        if frame.person is not None:
+            index = number
+        empty = frame.person is None
+        held.append(replace(frames[index], held=first + index) if empty else frame)
+    return tuple(held)
+
+
+def missing_stretches(frames: Sequence[FramePlan], first: int) -> list[tuple[int, int]]:
+    """List half-open ranges of driver frames in which the person was not found."""
+    stretches: list[tuple[int, int]] = []
+    for number, frame in enumerate(frames, first):
+        if frame.person is not None and frame.held is None:
+            continue
+        if stretches and stretches[-1][1] == number:
+            stretches[-1] = (stretches[-1][0], number + 1)
+        else:
+            stretches.append((number, number + 1))
+    return stretches
+
+
+def describe_missing(frames: Sequence[FramePlan], first: int, rate: Fraction) -> str:
+    """Say in which frames nobody was found and what is shown there; empty if there are none."""
+    stretches = missing_stretches(frames, first)
+    if not stretches:
+        return ""
+    count = sum(stop - start for start, stop in stretches)
+    held = any(frame.held is not None for frame in frames)
+    shown = "the frame before" if held else "background only"
+    times = list_stretches(stretches, first, rate)
+    return f"nobody found in {count} of {len(frames)} frames, {shown}: {times}"
+
+
+def list_stretches(stretches: Sequence[tuple[int, int]], first: int, rate: Fraction) -> str:
+    """List stretches as times in the output, with the driver's frames; the first ten of them."""
+    listed = [
+        f"{_clock((start - first) / rate)}-{_clock((stop - first) / rate)} (frames {start}:{stop})"
+        for start, stop in stretches[:LISTED_STRETCHES]
+    ]
+    more = len(stretches) - len(listed)
+    return ", ".join(listed) + (f" and {more} more" if more else "")
+
+
+def _clock(seconds: Fraction) -> str:
+    minutes, rest = divmod(float(seconds), 60)
+    return f"{int(minutes)}:{rest:05.2f}"

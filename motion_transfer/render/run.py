@@ -7,19 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from motion_transfer.media.formats import choose_format
-from motion_transfer.media.image import write_png
-from motion_transfer.media.publish import (
-    check_destination,
-    explain_disk_errors,
-    publish,
-    work_folder,
-)
-from motion_transfer.media.segments import join_segments, segment_path
-from motion_transfer.media.work import WorkFolder, key_of, was_published
-from motion_transfer.render.content import digest_file
-from motion_transfer.render.engine import Engine
-from motion_transfer.render.events import (
+from motion_transfer.events import (
     Finished,
     FramesDone,
     Listener,
@@ -28,21 +16,20 @@ from motion_transfer.render.events import (
     Started,
     ignore,
 )
-from motion_transfer.render.missing import describe_missing
-from motion_transfer.render.options import RenderOptions
-from motion_transfer.render.plan import Chunk, DriverPlan
-from motion_transfer.render.prepare import (
-    Prepared,
-    check_length,
-    check_photos,
-    choose_run_recipe,
-    plan_run,
-    prepare_run,
-    scan_driver,
+from motion_transfer.media.output.segments import join_segments, segment_path
+from motion_transfer.media.pictures.photo import write_png
+from motion_transfer.media.publish import (
+    check_destination,
+    explain_disk_errors,
+    publish,
+    work_folder,
 )
-from motion_transfer.render.recipe import Appearance
-from motion_transfer.render.sheet import ContactSheet
-from motion_transfer.render.source import prepare_source
+from motion_transfer.media.work import WorkFolder, digest_file, key_of, was_published
+from motion_transfer.render.composition import Composed, Prepared, compose, read_format
+from motion_transfer.render.driver import DriverScan
+from motion_transfer.render.engine import ContactSheet, Engine
+from motion_transfer.render.options import OutputOptions, RenderOptions
+from motion_transfer.render.plan import Chunk, describe_missing
 
 
 @dataclass(frozen=True)
@@ -50,10 +37,11 @@ class RenderReport:
     """What a run made.
 
     Attributes:
-        output: the finished file or folder.
-        renderer: the one that drew it.
-        wall_seconds: the whole run; render_seconds: without planning and loading.
-        missing: half-open ranges of driver frames in which nobody was found.
+        output: The finished file or folder.
+        renderer: The one that drew it.
+        wall_seconds: The whole run.
+        render_seconds: Without planning and loading.
+        missing: Half-open ranges of driver frames in which nobody was found.
     """
 
     output: Path
@@ -80,26 +68,28 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
         with the chunks that were finished, if any were.
     """
     began = time.perf_counter()
-    choose_format(options.output, codec=options.codec, crf=options.crf)
+    read_format(options)  # before anything is made beside an output that cannot be
     check_destinations(options)
     with WorkFolder(options.output, restart=options.restart) as work:
-        prepared, appearance = prepare(options, work, listener)
+        composed = prepare(options, work, listener)
+        prepared = composed.prepared
         render_began = time.perf_counter()
-        _render(options, prepared, appearance, work, listener)
+        _render(options, composed, work, listener, options.worker_count)
     ended = time.perf_counter()
-    width, height = prepared.canvas.size
+    plan, (width, height) = prepared.plan, prepared.canvas.size
     report = RenderReport(
         output=options.output,
         renderer=prepared.recipe.name,
-        frame_count=len(prepared.plan.frames),
+        frame_count=len(plan.frames),
         width=width,
         height=height,
-        frame_rate=prepared.plan.frame_rate,
+        frame_rate=plan.frame_rate,
         wall_seconds=ended - began,
         render_seconds=ended - render_began,
-        missing=tuple(prepared.plan.missing),
+        missing=tuple(plan.missing),
     )
-    _report_missing(prepared.plan, listener)
+    if note := describe_missing(plan.frames, plan.first, plan.frame_rate):
+        listener(Notice(note))
     listener(
         Finished(
             report.output,
@@ -113,36 +103,28 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
     return report
 
 
-def check_destinations(options: RenderOptions) -> None:
+def check_destinations(options: OutputOptions) -> None:
     """Refuse an output that exists, unless it may be replaced or a stopped run just published it.
 
     Raises: OutputError.
     """
     ours = not options.restart and was_published(options.output)
-    check_destination(options.output, force=options.force or ours)
-    if options.sheet is not None:
-        check_destination(options.sheet, force=options.force or ours)
+    for path in filter(None, (options.output, options.sheet)):
+        check_destination(path, force=options.force or ours)
 
 
-def prepare(
-    options: RenderOptions, work: WorkFolder, listener: Listener
-) -> tuple[Prepared, Appearance]:
-    """Everything that comes before the first frame. Raises: InputError and its kinds."""
-    output_format = choose_format(options.output, codec=options.codec, crf=options.crf)
-    check_photos(options)  # now: to find a driver's people may take long
-    scan = scan_driver(options, work.path, listener)
-    if scan.pictures is not None:  # so that the folder stays if the run is stopped
-        work.note(scan.pictures.iuv.name, scan.pictures.digest, scan.pictures.key)
-    plan = plan_run(options, scan)
-    check_length(options, output_format, plan)
-    recipe = choose_run_recipe(options, plan, listener)
-    source = prepare_source(options, recipe.texture_size)
-    prepared = prepare_run(options, output_format, scan, plan, recipe, source)
-    return prepared, recipe.appearance_of(source)
+def prepare(options: RenderOptions, work: WorkFolder, listener: Listener) -> Composed:
+    """Do everything that comes before the first frame. Raises: InputError and its kinds."""
+
+    def keep(scan: DriverScan) -> None:
+        if scan.pictures is not None:  # so that their folder stays if the run is stopped
+            work.note(scan.pictures.iuv.name, scan.pictures.digest, scan.pictures.key)
+
+    return compose(options, work.path, listener, scanned=keep)
 
 
 def missing_chunks(prepared: Prepared, work: WorkFolder) -> list[Chunk]:
-    """The chunks that no earlier run of the same content has finished."""
+    """List the chunks that no earlier run of the same content has finished."""
     return [
         chunk
         for chunk in prepared.plan.chunks
@@ -151,12 +133,12 @@ def missing_chunks(prepared: Prepared, work: WorkFolder) -> list[Chunk]:
 
 
 def piece_of(prepared: Prepared, chunk: Chunk) -> str:
-    """The name of a chunk's segment in the work folder."""
+    """Name a chunk's segment in the work folder."""
     return segment_path(Path(), chunk.index, prepared.output_format).name
 
 
 def output_key(prepared: Prepared) -> str:
-    """Of the content of the whole output. Raises: InputError if its sound is gone."""
+    """Compute the key of the whole output. Raises: InputError if its sound is gone."""
     audio = prepared.audio
     return key_of(
         {
@@ -167,7 +149,7 @@ def output_key(prepared: Prepared) -> str:
 
 
 def assemble(
-    options: RenderOptions, prepared: Prepared, folder: Path, sheet: ContactSheet | None
+    options: OutputOptions, prepared: Prepared, folder: Path, sheet: ContactSheet | None
 ) -> Path:
     """Join the segments in a work folder to an output without its name yet; write the sheet."""
     finished = folder / f"finished.part-0{options.output.suffix.lower()}"
@@ -185,19 +167,10 @@ def assemble(
     return finished
 
 
-def _report_missing(plan: DriverPlan, listener: Listener) -> None:
-    note = describe_missing(plan.frames, plan.first, plan.frame_rate)
-    if note:
-        listener(Notice(note))
-
-
 def _render(
-    options: RenderOptions,
-    prepared: Prepared,
-    appearance: Appearance,
-    work: WorkFolder,
-    listener: Listener,
+    options: OutputOptions, composed: Composed, work: WorkFolder, listener: Listener, workers: int
 ) -> None:
+    prepared = composed.prepared
     key = output_key(prepared)
     if work.published(key):
         work.clear()
@@ -223,14 +196,14 @@ def _render(
     engine = Engine(
         prepared,
         reader=prepared.driver.open(),
-        renderer=prepared.recipe.renderer(appearance),
+        renderer=prepared.recipe.renderer(composed.appearance),
         sheet=sheet,
         listener=listener,
     )
     chunks = [(chunk, work.temporary(piece_of(prepared, chunk))) for chunk in missing]
     try:
         with explain_disk_errors(options.output):
-            engine.render(chunks, options.worker_count, finish)
+            engine.render(chunks, workers, finish)
             finished = assemble(options, prepared, work.path, sheet)
             work.publish(finished, key)
     except BaseException:

@@ -1,1 +1,1 @@
-"""Repairing IUV sequences: frames without people, speckles, trembling borders; all streaming."""
+"""Repairs of IUV sequences: frames without people, speckles, trembling borders; all streaming."""

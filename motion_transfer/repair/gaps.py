@@ -14,12 +14,14 @@ from motion_transfer.media.nearest import take_nearest
 
 FillGaps = Literal["hold", "interpolate"]
 
+# all chosen by eye
 MATCHED_PIXELS = 400  # of one part: plenty for the six numbers of its movement
 MATCH_LEVELS = 6.0  # of 255 in U and V: further apart is another place of the part
-FEWEST_MATCHES = 24
+FEWEST_MATCHES = 24  # four times the numbers to be found; with fewer, outliers decide
 LARGEST_STRETCH = 2.0  # in a gap; a part that grows more was matched wrongly
+SIMILAR_SIZE = 4.0  # people of more than so many times the pixels, or less, are not the same
 JOIN_SHARE = 0.03  # of the frame's height: regions this close are one person
-CRACK_PX = 5
+CRACK_PX = 5  # side of what closes the seams between parts that were moved apart
 
 Frame = UInt8[np.ndarray, "H W C"]
 Mask = Bool[np.ndarray, "H W"]
@@ -28,10 +30,10 @@ Movement = Float[np.ndarray, "2 3"]
 
 
 def fill_gaps(frames: Iterable[Frame], how: FillGaps) -> Iterator[Frame]:
-    """The frames, those without anybody filled; at most two are kept at a time.
+    """Fill the frames that show nobody; at most two are kept at a time.
 
-    At the ends, and with `hold`, the nearest frame before (at the start: after) is repeated. With
-    `interpolate`, see `blend`. A sequence of nobody stays as it is.
+    At the ends, and with `hold`, the nearest frame before (at the start: after) is repeated; with
+    `interpolate`, those around are blended. A sequence of nobody stays as it is.
     """
     last: Frame | None = None
     waiting = 0
@@ -47,15 +49,12 @@ def fill_gaps(frames: Iterable[Frame], how: FillGaps) -> Iterator[Frame]:
                 yield last if how == "hold" else blend(last, frame, step / (waiting + 1))
         yield frame
         last, waiting = frame, 0
-    for _ in range(waiting):
-        if last is not None:
-            yield last
-        elif frame is not None:
-            yield frame
+    if waiting and frame is not None:
+        yield from [frame if last is None else last] * waiting
 
 
 def blend(before: Frame, after: Frame, time: float) -> Frame:
-    """What lies between two frames, `time` in 0..1.
+    """Make what lies between two frames, `time` in 0..1.
 
     The nearer frame is taken, and each part of each person in it is moved along the way to the same
     places, by (I, U, V), in the other one: an affine map for each part. People are connected
@@ -64,30 +63,28 @@ def blend(before: Frame, after: Frame, time: float) -> Frame:
     near, far, way = (before, after, time) if time < 0.5 else (after, before, 1 - time)
     filled = np.zeros_like(near)
     for mine, other in _pair_people(near, far):
-        person = near * mine[..., None]
         if other is None:
-            np.copyto(filled, person, where=mine[..., None])
-            continue
-        _move_person(filled, person, far * other[..., None], way)
+            np.copyto(filled, near, where=mine[..., None])
+        else:
+            _move_person(filled, near * mine[..., None], far * other[..., None], way)
     body = (filled[..., 0] > 0).astype(np.uint8)
     closed = cv2.morphologyEx(body, cv2.MORPH_CLOSE, np.ones((CRACK_PX, CRACK_PX), np.uint8))
     cracks = (closed > 0) & (body == 0)
-    # the nearest pixel of the body, not of the background
-    mended = take_nearest(filled, filled[..., 0] == 0)
-    filled[cracks] = mended[cracks]
+    # with the nearest pixel of the body: around a crack there is background, too
+    filled[cracks] = take_nearest(filled, filled[..., 0] == 0)[cracks]
     return filled
 
 
 def _move_person(filled: Frame, person: Frame, partner: Frame, way: float) -> None:
-    """Draw a person on its way to its partner into a frame, large parts first."""
+    """Draw a person on its way to its partner into a frame."""
     parts, counts = np.unique(person[..., 0], return_counts=True)
+    # large parts first, as hands before the body are not to be painted over by it
     by_size = [int(part) for part in parts[np.argsort(-counts)] if part]
     whole = _shift(person[..., 0] > 0, partner[..., 0] > 0)
     size = filled.shape[1::-1]
     for part in by_size:
         movement = _find_movement(person, partner, part)
-        movement = whole if movement is None else movement
-        step = (1 - way) * np.eye(2, 3) + way * movement
+        step = (1 - way) * np.eye(2, 3) + way * (whole if movement is None else movement)
         piece = person * (person[..., :1] == part)
         moved = cv2.warpAffine(piece, step, size, flags=cv2.INTER_NEAREST)
         np.copyto(filled, moved, where=moved[..., :1] > 0)
@@ -115,20 +112,23 @@ def _find_movement(person: Frame, partner: Frame, part: int) -> Movement | None:
     sane = stretches[0] < LARGEST_STRETCH and stretches[1] > 1 / LARGEST_STRETCH
     if rank == 3 and sane:
         return movement
+    # pixels in a line, or matched wrongly in part: the median shift is true at least
     return np.hstack([np.eye(2), np.median(goal - start[:, :2], axis=0)[:, None]])
 
 
 def _shift(mine: Mask, other: Mask) -> Movement:
+    """The movement from one region's centre of gravity to another's."""
     centres = [np.argwhere(mask).mean(0)[::-1] for mask in (mine, other)]
     return np.hstack([np.eye(2), (centres[1] - centres[0])[:, None]])
 
 
 def _pair_people(near: Frame, far: Frame) -> list[tuple[Mask, Mask | None]]:
     """Each person of one frame with the nearest of similar size in the other, largest first."""
-    mine, others = _find_regions(near), _find_regions(far)
+    others = _find_regions(far)
     pairs: list[tuple[Mask, Mask | None]] = []
-    for region in mine:
-        similar = [o for o in others if 0.25 < o.sum() / region.sum() < 4]
+    for region in _find_regions(near):
+        size = region.sum()
+        similar = [o for o in others if 1 / SIMILAR_SIZE < o.sum() / size < SIMILAR_SIZE]
         centre = np.argwhere(region).mean(0)
         best = min(
             similar,

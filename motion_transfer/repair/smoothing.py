@@ -1,51 +1,50 @@
 """Steady part borders and steady U, V, from the frame before and the frame after.
 
-Both are first moved onto the frame between them, by optical flow (DIS; Kroeger et al., ECCV 2016)
-of the IUV images themselves. A pixel whose flow there and back does not return is left as it is.
+Both are first moved onto the frame between them, by optical flow of the IUV images themselves. A
+pixel whose flow there and back does not return is left as it is.
+Source: the flow is DIS (Kroeger et al., ECCV 2016), as OpenCV has it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from motion_transfer.drawing.person import bounding_box
 from nhrr_core.iuv import PART_COUNT
 
+# all chosen by eye
 BORDER_PX = 2  # how far a border may be put back; more could wear thin limbs away
 RETURN_PX = 1.5  # how far from its start the flow there and back may end
 STEADY_LEVELS = 32  # of 255: U or V further apart is another place, not noise
 CUT_SHARE = 0.05  # of the pixels with somebody: fewer with the same part, and the shot is another
 SMALLEST_FLOW_PX = 32  # side of a picture in which DIS finds anything
-MARGIN_PX = 16
+MARGIN_PX = 16  # around the people: flow wants some surroundings
 GREYS = np.array([0, *(40 + 37 * part % 200 for part in range(1, PART_COUNT + 1))], np.uint8)
-"""A grey for each part; neighbours on the body are far apart."""
+"""A grey for each part, 40..239; the step of 37 sets parts of neighbouring numbers far apart."""
 
 Frame = UInt8[np.ndarray, "H W 3"]
 Flow = Float[np.ndarray, "H W 2"]
+Moved = tuple[Frame, Bool[np.ndarray, "H W"]]
+"""A neighbour brought onto a frame, pixel by pixel, and where that is sure."""
 
 
 def smooth(frames: Iterable[Frame]) -> Iterator[Frame]:
-    """The frames, each steadied by its neighbours; three are kept at a time.
+    """Steady each frame by its neighbours; three are kept at a time.
 
     A pixel takes another part only where the frame before and the frame after agree on it, and only
     within two pixels of where the frame itself has that part. U and V are averaged, 1 : 2 : 1, over
     pixels of the same part only. Equal frames stay as they are, to the bit.
     """
     before: Frame | None = None
-    for current, after in pairwise(_with_end(frames)):
-        if current is None:
-            return
+    for current, after in pairwise(chain(frames, [None])):
+        assert current is not None
         yield _steady(current, before, after)
         before = current
-
-
-def _with_end(frames: Iterable[Frame]) -> Iterator[Frame | None]:
-    yield from frames
-    yield None
 
 
 def _steady(current: Frame, before: Frame | None, after: Frame | None) -> Frame:
@@ -53,17 +52,19 @@ def _steady(current: Frame, before: Frame | None, after: Frame | None) -> Frame:
     others = [other for other in (before, after) if other is not None and _follows(current, other)]
     if not others or all(np.array_equal(current, other) for other in others):
         return current
-    box = _box([current, *others])
+    # not the whole frame: flow is what takes time, and people fill a part of it
+    people = bounding_box(np.bitwise_or.reduce([current, *others]))
+    top, left = max(0, people.top - MARGIN_PX), max(0, people.left - MARGIN_PX)
+    box = np.s_[top : people.bottom + MARGIN_PX, left : people.right + MARGIN_PX]
     here = np.ascontiguousarray(current[box])
     moved = [_move(np.ascontiguousarray(other[box]), here) for other in others]
     steady = _put_borders_back(here, moved) if len(moved) == 2 else here
-    steady = _average_uv(steady, moved)
     result = current.copy()
-    result[box] = steady
+    result[box] = _average_uv(steady, moved)
     return result
 
 
-def _put_borders_back(here: Frame, moved: list[tuple[Frame, Bool[np.ndarray, "H W"]]]) -> Frame:
+def _put_borders_back(here: Frame, moved: list[Moved]) -> Frame:
     """Pixels whose two neighbours in time agree on another part that is close by take it."""
     (first, first_sure), (second, second_sure) = moved
     agreed = first[..., 0] == second[..., 0]
@@ -80,7 +81,7 @@ def _put_borders_back(here: Frame, moved: list[tuple[Frame, Bool[np.ndarray, "H 
     return steady
 
 
-def _average_uv(here: Frame, moved: list[tuple[Frame, Bool[np.ndarray, "H W"]]]) -> Frame:
+def _average_uv(here: Frame, moved: list[Moved]) -> Frame:
     """U and V averaged with those neighbours that show the same part and nearly the same place."""
     total = 2 * here[..., 1:].astype(np.uint16)
     weight = np.full(here.shape[:2], 2, np.uint16)
@@ -91,20 +92,24 @@ def _average_uv(here: Frame, moved: list[tuple[Frame, Bool[np.ndarray, "H W"]]])
         total += other[..., 1:] * same[..., None]
         weight += same
     averaged = here.copy()
-    averaged[..., 1:] = (total + weight[..., None] // 2) // weight[..., None]
+    averaged[..., 1:] = (total + weight[..., None] // 2) // weight[..., None]  # to the nearest
     return averaged
 
 
-def _move(other: Frame, here: Frame) -> tuple[Frame, Bool[np.ndarray, "H W"]]:
-    """A neighbour brought onto this frame, pixel by pixel, and where that is sure."""
+def _move(other: Frame, here: Frame) -> Moved:
+    """Bring a neighbour onto this frame."""
     if np.array_equal(other, here) or min(here.shape[:2]) < SMALLEST_FLOW_PX:
         return other, np.ones(here.shape[:2], bool)
     dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     grey_here, grey_other = _as_grey(here), _as_grey(other)
     there, back = dis.calc(grey_here, grey_other, None), dis.calc(grey_other, grey_here, None)  # type: ignore[call-overload]
-    rows, columns, inside = _targets(there)
-    gap = np.abs(there + back[rows, columns]).max(-1)
-    return _sample(other, there, other[rows, columns]), inside & (gap <= RETURN_PX)
+    height, width = here.shape[:2]
+    rows = np.rint(np.arange(height)[:, None] + there[..., 1]).astype(np.int64)
+    columns = np.rint(np.arange(width) + there[..., 0]).astype(np.int64)
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    goal = rows.clip(0, height - 1), columns.clip(0, width - 1)
+    returns = np.abs(there + back[goal]).max(-1) <= RETURN_PX
+    return _sample(other, there, other[goal]), inside & returns
 
 
 def _sample(other: Frame, flow: Flow, nearest: Frame) -> Frame:
@@ -125,15 +130,6 @@ def _sample(other: Frame, flow: Flow, nearest: Frame) -> Frame:
     return sampled
 
 
-def _targets(flow: Flow) -> tuple[np.ndarray, np.ndarray, Bool[np.ndarray, "H W"]]:
-    """The pixel that each pixel flows to, held inside, and whether it was inside."""
-    height, width = flow.shape[:2]
-    rows = np.rint(np.arange(height)[:, None] + flow[..., 1]).astype(np.int64)
-    columns = np.rint(np.arange(width) + flow[..., 0]).astype(np.int64)
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    return rows.clip(0, height - 1), columns.clip(0, width - 1), inside
-
-
 def _as_grey(iuv: Frame) -> UInt8[np.ndarray, "H W"]:
     """A picture in which parts, and places on them, can be followed."""
     shade = iuv[..., 1].astype(np.uint16) + iuv[..., 2]
@@ -146,13 +142,3 @@ def _follows(current: Frame, other: Frame) -> bool:
     occupied = (current[..., 0] | other[..., 0]) > 0
     same = (current[..., 0] == other[..., 0]) & occupied
     return bool(same.sum() >= CUT_SHARE * max(1, occupied.sum()))
-
-
-def _box(frames: list[Frame]) -> tuple[slice, slice]:
-    """Rows and columns with anybody in any frame, and some around."""
-    seen = np.logical_or.reduce([frame[..., 0] > 0 for frame in frames])
-    spans = [np.flatnonzero(seen.any(axis)) for axis in (1, 0)]
-    return tuple(  # type: ignore[return-value]
-        slice(max(0, span[0] - MARGIN_PX), span[-1] + 1 + MARGIN_PX) if len(span) else slice(0, 0)
-        for span in spans
-    )

@@ -5,6 +5,8 @@ RUN/checkpoints/step_000500/
     discriminator.safetensors                where there is one
     optimisers.pt, random.pt                 tensors and plain values (`weights_only`)
     state.json                               step and the data's digest
+
+Each model says in its notes what it was trained on, how, and under which licence.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ import json
 import pickle
 import re
 import shutil
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ from safetensors.torch import load_file, save_file
 from torch import nn
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.publish import explain_disk_errors, publish
+from motion_transfer.media.publish import publish, work_folder
 from motion_transfer.training.config import KeepingSettings
 from motion_transfer.weights.checkpoint import load_checkpoint, save_checkpoint
 from nhrr_core import NeuralReRenderer
@@ -39,7 +40,7 @@ class RunState:
     """Everything that a run has learned.
 
     Attributes:
-        optimisers: by name, anything with `state_dict` and `load_state_dict`.
+        optimisers: By name, anything with `state_dict` and `load_state_dict`.
     """
 
     model: NeuralReRenderer
@@ -47,14 +48,20 @@ class RunState:
     discriminator: nn.Module | None
     optimisers: Mapping[str, Any]
 
+    @property
+    def models(self) -> dict[str, NeuralReRenderer]:
+        """Those that render, by the names of their files."""
+        average = {} if self.average is None else {"average": self.average}
+        return {"model": self.model, **average}
+
 
 def checkpoint_folder(run: Path, step: int) -> Path:
-    """Where the checkpoint of a step lies."""
+    """Name the folder of a step's checkpoint."""
     return run / "checkpoints" / f"step_{step:06d}"
 
 
 def list_steps(run: Path) -> list[int]:
-    """The steps that have a checkpoint, in order."""
+    """List the steps that have a checkpoint, in order."""
     folder = run / "checkpoints"
     found = [PATTERN.fullmatch(item.name) for item in folder.iterdir()] if folder.is_dir() else []
     return sorted(int(match[1]) for match in found if match)
@@ -68,43 +75,34 @@ def write_state(
     Raises: OutputError where the disk is full or the place cannot be written.
     """
     final = checkpoint_folder(run, step)
-    with explain_disk_errors(final):
-        final.parent.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=f".{final.name}.work-", dir=final.parent))
-        try:
-            _fill(work, step, state, data_digest, notes)
-            work.chmod(0o755)
-            publish(work, final)
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
+    with work_folder(final) as work:
+        for name, model in state.models.items():
+            save_checkpoint(work / f"{name}.safetensors", model, notes=notes)
+        if state.discriminator is not None:
+            weights = state.discriminator.state_dict()
+            tensors = {name: value.detach().contiguous() for name, value in weights.items()}
+            save_file(tensors, work / "discriminator.safetensors")
+        optimisers = {name: each.state_dict() for name, each in state.optimisers.items()}
+        torch.save(optimisers, work / "optimisers.pt")
+        # batches follow from the step alone; this is for networks that draw numbers themselves
+        random = {"cpu": torch.get_rng_state()}
+        if torch.cuda.is_available():
+            random["cuda"] = torch.cuda.get_rng_state()
+        torch.save(random, work / "random.pt")
+        content = {"step": step, "data": data_digest}
+        (work / STATE).write_text(json.dumps(content, indent=1) + "\n")
+        work.chmod(0o755)  # a temporary folder is its owner's alone
+        publish(work, final)
     return final
-
-
-def _fill(
-    folder: Path, step: int, state: RunState, data_digest: str, notes: Mapping[str, str]
-) -> None:
-    save_checkpoint(folder / "model.safetensors", state.model, notes=notes)
-    if state.average is not None:
-        save_checkpoint(folder / "average.safetensors", state.average, notes=notes)
-    if state.discriminator is not None:
-        tensors = {k: v.detach().contiguous() for k, v in state.discriminator.state_dict().items()}
-        save_file(tensors, folder / "discriminator.safetensors")
-    optimisers = {name: each.state_dict() for name, each in state.optimisers.items()}
-    torch.save(optimisers, folder / "optimisers.pt")
-    random = {"cpu": torch.get_rng_state()}
-    if torch.cuda.is_available():
-        random["cuda"] = torch.cuda.get_rng_state()
-    torch.save(random, folder / "random.pt")
-    content = {"step": step, "data": data_digest}
-    (folder / STATE).write_text(json.dumps(content, indent=1) + "\n")
 
 
 def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> None:
     """Fill the networks and optimisers, and set torch's random state, from a checkpoint.
 
-    Raises: InputError if it is damaged or belongs to other data; WeightsError likewise.
+    Raises: InputError or WeightsError if it is damaged or belongs to other data.
     """
     folder = checkpoint_folder(run, step)
+    damages = (OSError, KeyError, ValueError, RuntimeError, SafetensorError)
     try:
         content = json.loads((folder / STATE).read_text())
         if content["data"] != data_digest:
@@ -112,10 +110,9 @@ def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> No
                 f"checkpoint {folder} was trained on other pairs than the data has now; put the"
                 " data back, or start anew with --init and another -o"
             )
-        for model, name in ((state.model, "model"), (state.average, "average")):
-            if model is not None:
-                kept = load_checkpoint(folder / f"{name}.safetensors")
-                model.load_state_dict(kept.state_dict())
+        for name, model in state.models.items():
+            kept = load_checkpoint(folder / f"{name}.safetensors")
+            model.load_state_dict(kept.state_dict())
         if state.discriminator is not None:
             state.discriminator.load_state_dict(load_file(folder / "discriminator.safetensors"))
         optimisers = torch.load(folder / "optimisers.pt", map_location="cpu", weights_only=True)
@@ -125,16 +122,16 @@ def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> No
         torch.set_rng_state(random["cpu"])
         if "cuda" in random and torch.cuda.is_available():
             torch.cuda.set_rng_state(random["cuda"])
-    except (OSError, KeyError, ValueError, RuntimeError, SafetensorError) as error:
-        raise _damaged(folder, error) from error
-    except pickle.UnpicklingError as error:
-        raise _damaged(folder, error) from error
+    except (*damages, pickle.UnpicklingError) as error:
+        raise InputError(
+            f"checkpoint {folder} is damaged ({error}); remove the folder to go on from the one"
+            " before"
+        ) from error
 
 
 def tidy(run: Path, settings: KeepingSettings) -> None:
     """Remove what the rule does not keep, and what a killed run left half-written."""
-    folder = run / "checkpoints"
-    for left in folder.glob(".step_*"):
+    for left in (run / "checkpoints").glob(".step_*"):
         shutil.rmtree(left)
     for step in list_steps(run)[: -settings.keep_last]:
         if not settings.keep_every or step % settings.keep_every:
@@ -142,9 +139,3 @@ def tidy(run: Path, settings: KeepingSettings) -> None:
             hidden = doomed.with_name(f".{doomed.name}.gone")  # never a checkpoint by halves
             doomed.rename(hidden)
             shutil.rmtree(hidden)
-
-
-def _damaged(folder: Path, error: Exception) -> InputError:
-    return InputError(
-        f"checkpoint {folder} is damaged ({error}); remove the folder to go on from the one before"
-    )

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from motion_transfer.drawing.person import choose_person, find_people, isolate
 from motion_transfer.errors import InputError
-from motion_transfer.media.iuv_image import ChannelOrder
-from motion_transfer.media.iuv_stream import IuvReader, open_reader, open_stream
-from motion_transfer.media.video import VIDEO_SUFFIXES, PictureVideo
-from motion_transfer.render.person import choose_person, find_people, isolate
-from motion_transfer.training.pairs import Entry, Pair, PairList, check_pairs, list_problems
+from motion_transfer.media.iuv.formats import ChannelOrder, iuv_suffixes
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.media.iuv.stream import IuvReader
+from motion_transfer.media.pictures.formats import VIDEO_SUFFIXES
+from motion_transfer.media.pictures.video import IndexedVideo
+from motion_transfer.training.pairs import (
+    Done,
+    Pair,
+    PairList,
+    check_pairs,
+    ignore_done,
+    list_problems,
+)
 from motion_transfer.training.pictures import PersonPicture
 
 IUV_ENDINGS = ("_IUV", "_iuv")
-IUV_SUFFIXES = (".mkv", ".avi", ".mov", ".npy", ".npz", "")  # the last: a folder of images
 DEFAULT_MOMENTS = 8
 
 
@@ -24,16 +32,8 @@ class Clip:
     """A video and the IUV of its frames."""
 
     name: str
-    video: PictureVideo
+    video: IndexedVideo
     iuv: IuvReader
-
-    @property
-    def frame_count(self) -> int:
-        return self.video.frame_count
-
-    def frame(self, index: int) -> ClipFrame:
-        """One of its frames; negative numbers count from the end."""
-        return ClipFrame(self, range(self.frame_count)[index])
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,10 @@ class ClipFrame:
         return f"{self.clip.name}/{self.index:06d}"
 
     def load(self) -> PersonPicture:
-        """Raises: InputError if the frame is broken, sizes differ, or it shows nobody."""
+        """Read the frame and its IUV.
+
+        Raises: InputError if the frame is broken, sizes differ, or it shows nobody.
+        """
         rgb = self.clip.video.read(self.index)
         (iuv,) = self.clip.iuv.read(self.index, self.index + 1)
         where = f"frame {self.index} of {self.clip.video.path}"
@@ -59,15 +62,26 @@ class ClipFrame:
             )
         people = find_people(iuv)
         person = choose_person(people, "largest", where)
-        if len(person.regions) != people.region_count:
+        if len(person.regions) != people.region_count:  # somebody else is seen as well
             iuv = isolate(iuv, person)
         return PersonPicture(self.name, rgb, iuv, None)
+
+
+def list_files(folder: Path, suffixes: Sequence[str], without: tuple[str, ...]) -> list[Path]:
+    """List a folder's photos or videos in order, but for hidden ones and some ends of the stem."""
+    return [
+        path
+        for path in sorted(folder.iterdir())
+        if path.suffix.lower() in suffixes
+        and not path.stem.endswith(without)
+        and not path.name.startswith(".")
+    ]
 
 
 def open_clips(
     folder: Path, *, iuv_order: ChannelOrder | None = None
 ) -> tuple[list[Clip], list[str]]:
-    """The clips of a folder in order of name, and what is wrong with others, a line for each.
+    """Open the clips of a folder in order of name; tell what is wrong with others, a line each.
 
     A clip is `NAME.mp4` (or another video) with `NAME_IUV` or `NAME_iuv` beside it: a folder of
     IUV images, a lossless video, `.npy` or `.npz`, with as many frames.
@@ -76,13 +90,7 @@ def open_clips(
     """
     if not folder.is_dir():
         raise InputError(f"folder of clips {folder} does not exist")
-    videos = [
-        path
-        for path in sorted(folder.iterdir())
-        if path.suffix.lower() in VIDEO_SUFFIXES
-        and not path.stem.endswith(IUV_ENDINGS)
-        and not path.name.startswith(".")
-    ]
+    videos = list_files(folder, VIDEO_SUFFIXES, IUV_ENDINGS)
     if not videos:
         raise InputError(f"folder {folder} holds no videos ({', '.join(VIDEO_SUFFIXES)})")
     clips, problems = [], []
@@ -103,35 +111,36 @@ def open_clip_pairs(
     iuv_order: ChannelOrder | None = None,
     limit: int | None = None,
     skip_broken: bool = False,
-    done: Callable[[int, int], None] = lambda _count, _total: None,
+    done: Done = ignore_done,
 ) -> PairList:
-    """Pairs of frames of one clip, always the same, after each was looked at.
+    """Open pairs of frames of one clip, always the same, after each was checked.
 
     Args:
-        moments: see `choose_frames`.
-        limit: only the first so many clips.
-    Raises: InputError as `motion_transfer.training.pairs.open_pairs`.
+        moments: Of a clip, see `choose_frames`.
+        limit: Only the first so many clips.
+    Raises: InputError as `motion_transfer.training.pairs.open_pairs` does.
     """
     clips, problems = open_clips(folder, iuv_order=iuv_order)
     entries = []
     for clip in clips[:limit]:
-        for index in choose_frames(clip.frame_count, moments):
-            pair = Pair(clip.frame(0), clip.frame(index), group=clip.name, frame=index)
-            entries.append(Entry(clip.name, pair))
+        source = ClipFrame(clip, 0)
+        for index in choose_frames(clip.video.frame_count, moments):
+            pair = Pair(source, ClipFrame(clip, index), group=clip.name, frame=index)
+            entries.append((clip.name, pair))
     if not entries:
         raise InputError(list_problems(f"folder {folder} holds no pair of frames", problems))
     return check_pairs(folder.name, entries, problems, skip_broken=skip_broken, done=done)
 
 
 def choose_frames(frame_count: int, moments: int) -> Sequence[int]:
-    """Which frames of a clip are targets; the first one is the source.
+    """Choose which frames of a clip are targets; the first one is the source.
 
     Moments are spread evenly over the clip, and each gives two frames in a row, so that flicker
     can be measured.
     """
     if frame_count < 3:
         return range(1, frame_count)
-    last = frame_count - 2
+    last = frame_count - 2  # the last target but one: its successor is a target, too
     starts = [1 + (last - 1) * step // max(1, moments - 1) for step in range(moments)]
     return sorted({frame for start in starts for frame in (start, start + 1)})
 
@@ -140,14 +149,14 @@ def _open_clip(path: Path, order: ChannelOrder | None) -> Clip:
     beside = [
         path.with_name(f"{path.stem}{ending}{suffix}")
         for ending in IUV_ENDINGS
-        for suffix in IUV_SUFFIXES
+        for suffix in (*iuv_suffixes(several=True), "")  # the last: a folder
     ]
     iuv_path = next((candidate for candidate in beside if candidate.exists()), None)
     if iuv_path is None:
         raise InputError(
             f"no IUV beside it; expected {path.stem}_iuv/, {path.stem}_IUV.mkv or .npz"
         )
-    video, reader = PictureVideo(path), open_reader(open_stream(iuv_path), order)
+    video, reader = IndexedVideo(path), open_reader(open_stream(iuv_path), order)
     if video.frame_count != reader.stream.frame_count:
         raise InputError(
             f"it has {video.frame_count} frames, but {iuv_path.name} has"

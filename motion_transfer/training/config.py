@@ -1,23 +1,43 @@
-"""What a training run is: every setting, with the paper's values where the paper gives one."""
+"""What a training run is: its settings, and `train.toml`, the file that holds all of them.
+
+A setting, `section.key`, is a field of one of the dataclasses below. Its annotation says which
+values are possible, as pydantic checks them, and `option` describes it where the command line has
+it. Defaults are the paper's where the paper gives one. What needs torch is imported where it is
+used, so that help is instant.
+"""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from motion_transfer.errors import InputError
-from motion_transfer.render.options import parse_colour
-from nhrr_core import LossWeights, ModelConfig
+from motion_transfer.option import option, parse_colour
 
+if TYPE_CHECKING:
+    from nhrr_core import LossWeights, ModelConfig
+
+Count = Annotated[int, Field(ge=1)]
+Number = Annotated[int, Field(ge=0)]
+Factor = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Decay = Annotated[float, Field(ge=0, lt=1)]
 Perceptual = Literal["efficientnet-lite0", "vgg19", "none"]
 Identity = Literal["sphereface", "none"]
 Precision = Literal["auto", "fp32", "bf16"]
-CHOICES: dict[str, tuple[str, ...]] = {
-    "perceptual": get_args(Perceptual),
-    "identity": get_args(Identity),
-    "precision": get_args(Precision),
-}
+
+LOSSES = "Losses (the paper's; one without its network is an error)"
+DEFAULT_PRESET = "lite"
+FREE_TO_CHANGE = ("colour_margin", "clearance", "geometry")
+"""Settings of the model that a run may turn on, whatever it starts from."""
 
 PEOPLE = "people"
 PEOPLE_RECIPE: dict[str, Any] = {
@@ -33,19 +53,36 @@ SphereFace may be shipped; most steps are made at half size, and the discriminat
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
-    """How long, and what is said of the weights.
+    """How long a run is, where it starts, and what is said of its weights."""
 
-    Attributes:
-        steps: updates of the networks, in all.
-        seed: of the initial weights, the order of the pairs and the jitter of the crops.
-        init: checkpoint to start from (fine-tuning); empty: from random weights.
-        licence: of the weights, stored with them.
-    """
+    steps: Count = option(
+        "--steps", "Run", "Updates in all; default 100000.", kind="integer", default=100_000
+    )
+    seed: Number = option(
+        "--seed", "Run", "Of weights, order and crops; default 0.", kind="integer", default=0
+    )
+    init: str = option(
+        "--init", "Model", "Weights to start from, for fine-tuning.", default="", metavar="FILE"
+    )
+    licence: str = option(
+        "--licence", "Run", "Of the weights, stored with them.", default="not stated"
+    )
 
-    steps: int = 100_000
-    seed: int = 0
-    init: str = ""
-    licence: str = "not stated"
+
+@dataclass(frozen=True, kw_only=True)
+class ModelSettings:
+    """What the command line has of [model], whose other keys are those of `ModelConfig`."""
+
+    preset: str = option(
+        "--preset",
+        "Model",
+        "Sizes of the networks; default lite.",
+        default=DEFAULT_PRESET,
+        metavar="lite|paper",
+    )
+    variant: str = option(
+        "--variant", "Model", "full (default), no-int, ip, warp or warp-cond.", metavar="NAME"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,33 +90,47 @@ class DataSettings:
     """What is learned from.
 
     Attributes:
-        source: `people`, a CSV of pairs, a folder with `pairs.csv`, a folder of clips, or a folder
-            of one person's photos.
-        images: folder that a CSV's names are relative to; empty: the CSV's own.
-        background: colour behind targets whose alpha is known; `photo`: leave them as they are.
-        jitter: by up to which share of its side a crop is larger than the renderer's, and shifted
+        background: The colour behind targets whose alpha is known; `photo` leaves them as they are.
+        jitter: By up to which share of its side a crop is larger than the renderer's, and shifted
             within that; a driver's crop holds all of its poses and is larger, too.
-        people, views, size_px: how many synthetic people, photos of each, and their side; 0
-            people: ever new ones, two photos each, made while training goes on.
-        people_seed: who they are, if they are kept; `run.seed` decides the order of their pairs.
-        noise: share of the photos of people whose IUV has the faults of DensePose's.
-        people_cache: folder that keeps them; empty: `people` in the run's.
-        moments: frames of a clip that are targets, two in a row for each.
-        skip_broken: leave pairs with a problem out.
+        people: 0: two photos each of ever new ones, made while training goes on.
+        views: Photos of each, `size_px` high and wide.
+        people_seed: Who they are, if they are kept; `run.seed` decides the order of their pairs.
+        noise: The share of the photos of people whose IUV has the faults of DensePose's.
+        moments: Frames of a clip that are targets, two in a row for each.
     """
 
-    source: str = PEOPLE
-    images: str = ""
+    source: str = option(
+        "--data",
+        "Data",
+        "Synthetic people (default); a CSV of pairs from,to; a folder with pairs.csv, of clips"
+        " with their IUV, or of one person's photos.",
+        default=PEOPLE,
+        metavar="people|CSV|FOLDER",
+    )
+    images: str = option(
+        "--images", "Data", "Folder that a CSV's names are relative to; else the CSV's.", default=""
+    )
     background: str = "white"
-    jitter: float = 0.15
-    people: int = 64
-    views: int = 4
-    size_px: int = 256
-    people_seed: int = 0
-    noise: float = 0.5
-    people_cache: str = ""
-    moments: int = 8
-    skip_broken: bool = False
+    jitter: Factor = 0.15
+    people: Number = option(
+        "--people", "Data", "How many; default 64, 0 for ever new ones.", kind="integer", default=64
+    )
+    views: Annotated[int, Field(ge=2)] = 4
+    size_px: Annotated[int, Field(ge=32)] = 256
+    people_seed: Number = 0
+    noise: Share = 0.5
+    people_cache: str = option(
+        "--people-cache",
+        "Data",
+        "Folder that keeps them; default RUN/people.",
+        default="",
+        metavar="DIR",
+    )
+    moments: Count = 8
+    skip_broken: bool = option(
+        "--skip-broken", "Data", "Leave out pairs with a problem.", kind="flag", default=False
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,36 +138,43 @@ class LossSettings:
     """Which losses, with which weights and networks.
 
     Attributes:
-        perceptual, identity: the network, or `none` to leave the loss out.
-        vgg19_file: empty: where torchvision keeps it.
-        adversarial_from: share of the steps after which the discriminator joins.
-        *_weight: the lambdas. Source: the paper, Sec. 3.5; alpha's is this project's.
+        perceptual, identity: `none` leaves the loss out.
+        vgg19_file: Empty: where torchvision keeps it.
+        adversarial_from: The share of the steps after which the discriminator joins.
+        *_weight: The lambdas. Source: the paper, Sec. 3.5; alpha's is this project's.
     """
 
-    perceptual: Perceptual = "efficientnet-lite0"
-    vgg19_file: str = ""
+    perceptual: Perceptual = option(
+        "--perceptual",
+        LOSSES,
+        "efficientnet-lite0 (default) or vgg19 (the paper's, from torchvision's cache).",
+        default="efficientnet-lite0",
+        metavar="NAME",
+    )
+    vgg19_file: str = option(
+        "--vgg19", LOSSES, "VGG-19's weights; chooses it as well.", default="", metavar="FILE"
+    )
     identity: Identity = "sphereface"
-    sphereface_file: str = ""
+    sphereface_file: str = option(
+        "--sphereface", LOSSES, "Weights for the face loss.", default="", metavar="FILE"
+    )
     adversarial: bool = True
-    adversarial_from: float = 0.0
-    discriminator_width: int = 64
-    discriminator_scales: int = 3
-    perceptual_weight: float = 10.0
-    adversarial_weight: float = 1.0
-    identity_weight: float = 5.0
-    texture_weight: float = 1.0
-    alpha_weight: float = 10.0
+    adversarial_from: Share = 0.0
+    discriminator_width: Count = 64
+    discriminator_scales: Count = 3
+    perceptual_weight: Factor = 10.0
+    adversarial_weight: Factor = 1.0
+    identity_weight: Factor = 5.0
+    texture_weight: Factor = 1.0
+    alpha_weight: Factor = 10.0
 
     @property
     def weights(self) -> LossWeights:
         """The lambdas, for `nhrr_core.generator_loss`."""
-        return LossWeights(
-            perceptual=self.perceptual_weight,
-            adversarial=self.adversarial_weight,
-            identity=self.identity_weight,
-            texture=self.texture_weight,
-            alpha=self.alpha_weight,
-        )
+        from nhrr_core import LossWeights
+
+        names = [entry.name for entry in fields(LossWeights)]
+        return LossWeights(**{name: getattr(self, f"{name}_weight") for name in names})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,26 +182,31 @@ class OptimiserSettings:
     """Adam, for both players. Source: the paper, Sec. 3.5; batch and average are this project's.
 
     Attributes:
-        decay_from: share of the steps after which the learning rate falls in a straight line, to
-            nothing after the last one; 1: it stays as it is. Source: Pix2PixHD, where it is 0.5;
+        decay_from: The share of the steps after which the learning rate falls in a straight line,
+            to nothing after the last one; 1: it stays as it is. Source: Pix2PixHD, where it is 0.5;
             the paper says nothing of it.
-        batch_size: pairs at once on each device.
-        accumulation: batches whose gradients make one step.
-        ema_decay: of the averaged weights, which are what is exported; 0: no average.
-        half_size: share of the steps, the first ones, at half the sides of textures and images: a
-            quarter of the work.
-        inpainting: share of the steps that are the first stage of `ip`.
+        accumulation: Batches whose gradients make one step.
+        ema_decay: Of the averaged weights, which are what is exported; 0: no average.
+        half_size: The share of the steps, the first ones, at half the sides of textures and images:
+            a quarter of the work.
+        inpainting: The share of the steps that are the first stage of `ip`.
     """
 
-    learning_rate: float = 2e-4
-    decay_from: float = 1.0
-    beta1: float = 0.5
-    beta2: float = 0.999
-    batch_size: int = 4
-    accumulation: int = 1
-    ema_decay: float = 0.999
-    half_size: float = 0.0
-    inpainting: float = 0.5
+    learning_rate: Factor = 2e-4
+    decay_from: Share = 1.0
+    beta1: Decay = 0.5
+    beta2: Decay = 0.999
+    batch_size: Count = option(
+        "--batch-size",
+        "Speed",
+        "Pairs at once on each device; default 4.",
+        kind="integer",
+        default=4,
+    )
+    accumulation: Count = 1
+    ema_decay: Decay = 0.999
+    half_size: Share = 0.0
+    inpainting: Share = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,12 +215,20 @@ class SpeedSettings:
 
     Attributes:
         precision: `auto` is bf16 where the hardware multiplies it, else fp32.
-        workers: processes that read data; -1: half of the cores, at most 4; 0: none.
+        workers: -1: half of the cores, at most 4; 0: the process that trains reads as well.
     """
 
     precision: Precision = "auto"
-    compile: bool = False
-    workers: int = -1
+    compile: bool = option(
+        "--compile/--no-compile", "Speed", "Compile; default: no.", kind="switch", default=False
+    )
+    workers: Annotated[int, Field(ge=-1)] = option(
+        "--workers",
+        "Speed",
+        "Processes that read data; default: half of the cores.",
+        kind="integer",
+        default=-1,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,23 +236,34 @@ class KeepingSettings:
     """What is left on the disk, and how often, in steps; 0: never.
 
     Attributes:
-        checkpoint_every: also written at the end and when the run is stopped.
-        keep_last: checkpoints kept.
-        keep_every: those at multiples of it are kept for good.
-        sample_every: sample grids of `samples` pairs.
-        log_every: a line, and scalars for TensorBoard.
-        textures: folder that keeps unfolded textures, which runs on the same photos may share;
+        checkpoint_every: One is also written at the end and when the run is stopped.
+        keep_last: Checkpoints kept.
+        keep_every: Those at multiples of it are kept for good.
+        sample_every: Sample grids of `samples` pairs.
+        log_every: A line, and scalars for TensorBoard.
+        textures: The folder that keeps unfolded textures, which runs on the same photos may share;
             empty: `textures` in the run's.
     """
 
-    checkpoint_every: int = 250
-    keep_last: int = 2
-    keep_every: int = 10_000
-    sample_every: int = 250
-    samples: int = 4
-    log_every: int = 10
+    checkpoint_every: Number = 250
+    keep_last: Count = 2
+    keep_every: Number = 10_000
+    sample_every: Number = 250
+    samples: Count = 4
+    log_every: Count = 10
     textures: str = ""
     tensorboard: bool = True
+
+
+SECTIONS: dict[str, type] = {
+    "run": RunSettings,
+    "model": ModelSettings,
+    "data": DataSettings,
+    "losses": LossSettings,
+    "optimiser": OptimiserSettings,
+    "speed": SpeedSettings,
+    "keeping": KeepingSettings,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +271,7 @@ class TrainConfig:
     """Everything about a run. Raises: InputError naming the key whose value is impossible."""
 
     run: RunSettings = field(default_factory=RunSettings)
-    model: ModelConfig = field(default_factory=lambda: ModelConfig.preset("lite"))
+    model: ModelConfig = field(default_factory=lambda: _build_model({}, None))
     data: DataSettings = field(default_factory=DataSettings)
     losses: LossSettings = field(default_factory=LossSettings)
     optimiser: OptimiserSettings = field(default_factory=OptimiserSettings)
@@ -197,16 +279,12 @@ class TrainConfig:
     keeping: KeepingSettings = field(default_factory=KeepingSettings)
 
     def __post_init__(self) -> None:
-        for section in fields(self):
-            for key in fields(getattr(self, section.name)):
-                value = getattr(getattr(self, section.name), key.name)
-                problem = _find_problem(key.name, value)
-                if problem:
-                    raise InputError(
-                        f"{section.name}.{key.name} is {value!r}; it must be {problem}"
-                    )
+        for section in SECTIONS:
+            for key, value in vars(getattr(self, section)).items():
+                check_value(f"{section}.{key}", value)
         parse_colour(self.data.background)
         if self.optimiser.half_size:
+            # FeatureNet's four down blocks halve a texture to a sixteenth
             for key, multiple in (("image_size", 2**self.model.down_blocks), ("texture_size", 16)):
                 side = getattr(self.model, key)
                 if side % (2 * multiple):
@@ -225,47 +303,155 @@ class TrainConfig:
         """Steps before the discriminator joins."""
         return round(self.run.steps * self.losses.adversarial_from)
 
+    @property
+    def inpainting_steps(self) -> int:
+        """Steps of the first stage; 0 for all variants but `ip`."""
+        share = self.optimiser.inpainting if self.model.variant == "ip" else 0
+        return round(self.run.steps * share)
+
+    @property
+    def uses_texture_loss(self) -> bool:
+        """Whether the texture is supervised: the warps learn none, and No-Int leaves that out."""
+        return self.model.variant in ("full", "ip")
+
     def learning_rate(self, step: int) -> float:
-        """Of the update after `step` others."""
+        """Compute the learning rate of the update after `step` others."""
         steps, constant = self.run.steps, self.run.steps * self.optimiser.decay_from
         left = min(1.0, (steps - step) / (steps - constant)) if constant < steps else 1.0
         return self.optimiser.learning_rate * left
 
-    @property
-    def inpainting_steps(self) -> int:
-        """Steps of the first stage; 0 for all variants but `ip`."""
-        if self.model.variant != "ip":
-            return 0
-        return round(self.run.steps * self.optimiser.inpainting)
 
-    @property
-    def uses_texture_loss(self) -> bool:
-        """The warps learn no texture, and No-Int leaves its loss out."""
-        return self.model.variant in ("full", "ip")
+def read_settings(path: Path) -> dict[str, Any]:
+    """Read the keys of a `train.toml` as `section.key`, all of them known.
+
+    Raises: InputError naming file, line of the section and key.
+    """
+    from motion_transfer.media.pictures.photo import read_bytes
+
+    try:
+        text = read_bytes(path, "configuration").decode()
+        tables = tomllib.loads(text)
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"configuration {path} is not TOML: {error}") from error
+    settings = {}
+    for section, table in tables.items():
+        where = f"configuration {path}{_line_of(text, section)}"
+        if not isinstance(table, dict):
+            raise InputError(f"{where}: {section} stands outside a section")
+        for key, value in table.items():
+            try:
+                settings[f"{section}.{key}"] = check_value(f"{section}.{key}", value)
+            except InputError as error:
+                raise InputError(f"{where}, [{section}]: {error}") from error
+    return settings
 
 
-LOWEST = {
-    **dict.fromkeys(("steps", "batch_size", "accumulation", "keep_last", "samples", "moments"), 1),
-    **dict.fromkeys(("discriminator_width", "discriminator_scales", "log_every"), 1),
-    "views": 2,
-    "size_px": 32,
-    "workers": -1,
-}
-SHARES = ("beta1", "beta2", "ema_decay")
-WHOLE_SHARES = ("noise", "adversarial_from", "decay_from", "half_size", "inpainting")
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """Read `section.key=value` of the command line; the value as in TOML, or bare words.
+
+    Raises: InputError.
+    """
+    name, equals, word = text.partition("=")
+    if not equals:
+        raise InputError(f"{text!r} sets nothing; write section.key=value")
+    try:
+        value = tomllib.loads(f"value = {word}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = word
+    return name.strip(), check_value(name.strip(), value)
 
 
-def _find_problem(key: str, value: Any) -> str | None:
-    """What a value must be, if it is not."""
-    if key in CHOICES and value not in CHOICES[key]:
-        return " or ".join(CHOICES[key])
-    if isinstance(value, bool | str):
-        return None
-    low = LOWEST.get(key, 0)
-    if not math.isfinite(value) or value < low:
-        return f"{low} or more"
-    if key in SHARES and value >= 1:
-        return "below 1"
-    if key in WHOLE_SHARES and value > 1:
-        return "at most 1"
-    return None
+def check_value(name: str, value: Any) -> Any:
+    """Check the value of `section.key`; a whole number becomes a float where one is meant.
+
+    Raises: InputError naming section and key, the value, and what it must be.
+    """
+    section, _, key = name.partition(".")
+    if section not in SECTIONS:
+        raise InputError(f"unknown section {section!r}; there are {', '.join(SECTIONS)}")
+    kinds = _kinds(section)
+    if key not in kinds:
+        raise InputError(f"unknown key {key!r}; [{section}] has {', '.join(kinds)}")
+    try:
+        return kinds[key].validate_python(value, strict=True)
+    except ValidationError as error:
+        wanted = error.errors()[0]["msg"].removeprefix("Input should be ")
+        raise InputError(f"{name} is {value!r}; it must be {wanted}") from None
+
+
+def build_config(settings: Mapping[str, Any], *, model: ModelConfig | None = None) -> TrainConfig:
+    """Build a configuration from `section.key` settings; what is not set has its default.
+
+    Args:
+        model: The networks' shape where a checkpoint already decides it.
+    Raises: InputError on impossible values, or on settings that contradict that checkpoint.
+    """
+    settings = dict(settings)
+    if settings.get("data.source", PEOPLE) == PEOPLE:
+        recipe = dict(PEOPLE_RECIPE)
+        if model is not None:  # its checkpoint has decided that
+            del recipe["model.alpha"]
+        settings = {**recipe, **settings}
+    values: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+    for name, value in settings.items():
+        section, _, key = name.partition(".")
+        values[section][key] = value
+    shape = _build_model(values.pop("model"), model)
+    return TrainConfig(model=shape, **{name: SECTIONS[name](**values[name]) for name in values})
+
+
+def write_toml(config: TrainConfig) -> str:
+    """Write the whole configuration as TOML, every key of every section."""
+    lines = []
+    for section in SECTIONS:
+        lines.append(f"[{section}]")
+        for key, value in asdict(getattr(config, section)).items():
+            lines.append(f"{key} = {_toml(value)}")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _build_model(values: dict[str, Any], given: ModelConfig | None) -> ModelConfig:
+    from nhrr_core import ConfigError, ModelConfig
+
+    preset = values.pop("preset", DEFAULT_PRESET)
+    try:
+        if given is None:
+            return ModelConfig.preset(preset, **values)
+        given = replace(given, **{name: values[name] for name in FREE_TO_CHANGE if name in values})
+    except ConfigError as error:
+        raise InputError(f"[model]: {error}") from error
+    for name, value in values.items():
+        if getattr(given, name) != value:
+            raise InputError(
+                f"model.{name} is {value!r}, but the weights to start from have"
+                f" {getattr(given, name)!r}; leave it out, or start from others"
+            )
+    return given
+
+
+@cache
+def _kinds(section: str) -> dict[str, TypeAdapter[Any]]:
+    """What checks the value of each key of a section."""
+    hints = get_type_hints(SECTIONS[section], include_extras=True)
+    if section == "model":  # sizes depend on each other: `ModelConfig` checks their bounds
+        from nhrr_core import ModelConfig
+
+        hints |= get_type_hints(ModelConfig)
+    return {key: TypeAdapter(hint) for key, hint in hints.items()}
+
+
+def _line_of(text: str, section: str) -> str:
+    name = rf"\"?{re.escape(section)}\"?"
+    heading_or_key = re.compile(rf"^\s*(\[\s*{name}\s*\]|{name}\s*[.=])")
+    for number, line in enumerate(text.splitlines(), start=1):
+        if heading_or_key.match(line):
+            return f", line {number}"
+    return ""
+
+
+def _toml(value: bool | int | float | str) -> str:
+    if isinstance(value, str):
+        # TOML's strings are JSON's but for DEL, which has to be escaped
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return str(value).lower() if isinstance(value, bool) else repr(value)

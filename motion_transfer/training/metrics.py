@@ -15,7 +15,7 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
-from motion_transfer.render.person import disc, occupancy
+from motion_transfer.drawing.person import COVERS, bounding_box, disc, occupancy
 from nhrr_core import extract_texture, load_uv_layout
 
 Image = UInt8[np.ndarray, "H W 3"]
@@ -30,7 +30,7 @@ FLICKER_TEXELS = 128  # side of the texture that flicker is measured in: a few p
 
 
 def ssim(first: Image, second: Image, mask: Mask | None = None) -> float:
-    """Structural similarity, at most 1.
+    """Measure the structural similarity, at most 1.
 
     Each channel's map of a Gaussian window of 11 x 11 px, sigma 1.5, K1 0.01, K2 0.03, range 255,
     population covariance; the mean over channels and over all pixels (of the mask) whose window
@@ -44,14 +44,14 @@ def ssim(first: Image, second: Image, mask: Mask | None = None) -> float:
 
 
 def average_ssim(likeness: Float[np.ndarray, "H W"], mask: Mask | None = None) -> float:
-    """The mean of an SSIM map over the pixels whose window lies inside the picture."""
+    """Average an SSIM map over the pixels whose window lies inside the picture."""
     border = SSIM_WINDOW // 2
     inside = np.s_[border:-border, border:-border]
     return _mean(likeness[inside], None if mask is None else mask[inside])
 
 
 def ssim_map(first: Image, second: Image) -> Float[np.ndarray, "H W"]:
-    """Structural similarity around each pixel, mean over channels; mirrored at the border."""
+    """Map the structural similarity around each pixel, mean over channels, mirrored at borders."""
     offsets = np.arange(SSIM_WINDOW) - SSIM_WINDOW // 2
     window = np.exp(-(offsets**2) / (2 * SSIM_SIGMA**2))
     window /= window.sum()
@@ -70,29 +70,26 @@ def ssim_map(first: Image, second: Image) -> Float[np.ndarray, "H W"]:
 
 
 def psnr(first: Image, second: Image, mask: Mask | None = None) -> float:
-    """Peak signal-to-noise ratio in dB: 10 log10(255^2 / mean squared error); infinite if equal."""
+    """Measure the peak signal-to-noise ratio, 10 log10(255^2 / MSE) dB; infinite if equal."""
     difference = first.astype(np.float64) - second
     error = _mean((difference**2).mean(-1), mask)
     return float("inf") if error == 0 else float(10 * np.log10(PEAK**2 / error))
 
 
 def l1(first: Image, second: Image, mask: Mask | None = None) -> float:
-    """Mean absolute difference, in levels of 0..255."""
+    """Measure the mean absolute difference, in levels of 0..255."""
     return _mean(np.abs(first.astype(np.float64) - second).mean(-1), mask)
 
 
 def person_mask(iuv: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"] | None) -> Mask:
-    """Where the person is: alpha of at least one half; without alpha the IUV, grown.
+    """Mark where the person is: alpha of at least one half; without alpha the IUV, grown.
 
     It grows by 5 % of the person's height, as hair and loose clothes leave the IUV.
     """
     if alpha is not None:
-        return alpha >= 128
-    body = occupancy(iuv)
-    rows = np.flatnonzero(body.any(1))
-    if not len(rows):
-        return body > 0
-    return cv2.dilate(body, disc((rows[-1] - rows[0] + 1) * MASK_GROWTH)) > 0
+        return alpha >= COVERS
+    height = bounding_box(iuv).height
+    return cv2.dilate(occupancy(iuv), disc(height * MASK_GROWTH)) > 0
 
 
 def feature_distance(
@@ -100,7 +97,7 @@ def feature_distance(
     second: Sequence[Float[Tensor, "N C H W"]],
     mask: Mask | None = None,
 ) -> list[float]:
-    """Distance of deep features, for each of N pictures, in [0, 2].
+    """Measure the distance of deep features, for each of N pictures, in [0, 2].
 
     At each position of each layer the channels are scaled to unit length; the distance is the
     Euclidean length of the difference, averaged over positions (weighted by the mask, reduced by
@@ -126,7 +123,7 @@ def flicker(
     second: Image,
     second_iuv: UInt8[np.ndarray, "H W 3"],
 ) -> float:
-    """Change between two consecutive frames that motion does not explain, in levels of 0..255.
+    """Measure the change between consecutive frames that motion does not explain, in 0..255.
 
     Both frames are unfolded through their own IUV into a texture of 128 x 128 texels, where a body
     that only moves stays in place. The result is the mean absolute difference over the texels
@@ -146,7 +143,7 @@ def flicker(
 
 
 def frechet_distance(first: Float[np.ndarray, "N D"], second: Float[np.ndarray, "M D"]) -> float:
-    """Fréchet distance of the normal distributions of two sets of feature vectors.
+    """Measure the Fréchet distance of the normal distributions of two sets of feature vectors.
 
     |m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)), covariances with N - 1; the trace of the root as
     the sum of singular values of X1 X2', which needs no root of a product that may be singular.

@@ -14,15 +14,25 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Protocol, overload
+from typing import Protocol
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.image import read_bytes
-from motion_transfer.media.iuv_image import ChannelOrder
+from motion_transfer.media.iuv.formats import ChannelOrder
+from motion_transfer.media.pictures.photo import read_bytes
 from motion_transfer.training.pictures import PhotoFile, Picture
 
 HEADERS = (("from", "to"), ("source", "target"))
 PROBLEMS_SHOWN = 10
+
+Row = tuple[int, str, str]
+"""A line of a pair list: its number in the file (1 is the header) and the two names."""
+
+Done = Callable[[int, int], None]
+"""Called with how many more are done, and of how many in all."""
+
+
+def ignore_done(_count: int, _total: int) -> None:
+    """Hear of progress and do nothing."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +40,8 @@ class Pair:
     """Two pictures of one person.
 
     Attributes:
-        group: pairs of one group are not independent of each other (one source, one clip).
-        frame: the target's number in its clip, for clips.
+        group: Pairs of one group are not independent of each other (one source, one clip).
+        frame: The target's number in its clip, for clips.
     """
 
     source: Picture
@@ -45,85 +55,63 @@ class Pair:
         return f"{flat_stem(self.source.name)}__{flat_stem(self.target.name)}"
 
 
-class PairSource(Protocol):
-    """What evaluation asks of a set of pairs: a list, a folder of clips, or pairs that are made.
+class Pairs(Protocol):
+    """Pairs by number: a list, or people who are made when they are asked for.
 
     Attributes:
-        name: what people call it.
-        digest: SHA-256 that changes whenever a pair, its order, or a pixel of it changes.
+        endless: There are more than any run takes, and none is taken twice.
     """
 
     @property
-    def name(self) -> str: ...
-    @property
-    def digest(self) -> str: ...
+    def endless(self) -> bool: ...
     def __len__(self) -> int: ...
-    def __iter__(self) -> Iterator[Pair]: ...
+    def __getitem__(self, index: int, /) -> Pair: ...
 
 
-class PairList(Sequence[Pair]):
+@dataclass(frozen=True)
+class PairList:
     """Pairs that were checked.
 
     Attributes:
-        dropped: a line for each problem whose pairs were left out.
+        name: What people call them.
+        digest: The SHA-256 that changes whenever a pair, its order, or a pixel of it changes.
+        dropped: A line for each problem whose pairs were left out.
     """
 
-    def __init__(
-        self, name: str, pairs: Sequence[Pair], digest: str, dropped: Sequence[str] = ()
-    ) -> None:
-        self.name = name
-        self.digest = digest
-        self.dropped = tuple(dropped)
-        self._pairs = tuple(pairs)
+    name: str
+    pairs: Sequence[Pair]
+    digest: str
+    dropped: tuple[str, ...] = ()
+    endless = False
 
     def __len__(self) -> int:
-        return len(self._pairs)
+        return len(self.pairs)
 
-    @overload
-    def __getitem__(self, index: int) -> Pair: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Pair, ...]: ...
-    def __getitem__(self, index: int | slice) -> Pair | tuple[Pair, ...]:
-        return self._pairs[index]
+    def __getitem__(self, index: int) -> Pair:
+        return self.pairs[index]
 
     def __iter__(self) -> Iterator[Pair]:
-        return iter(self._pairs)
-
-
-@dataclass(frozen=True)
-class Row:
-    """A line of a pair list: its number in the file (1 is the header) and the two names."""
-
-    line: int
-    source: str
-    target: str
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A pair, and where it was asked for."""
-
-    where: str
-    pair: Pair
+        return iter(self.pairs)
 
 
 def flat_stem(name: str) -> str:
-    """A picture's name without its ending, folders joined by `-`: `7/0.png` becomes `7-0`."""
+    """Shorten a picture's name: no ending, folders joined by `-`; `7/0.png` becomes `7-0`."""
     return "-".join(PurePosixPath(name).with_suffix("").parts)
 
 
 def read_pair_list(path: Path) -> tuple[list[Row], list[str]]:
-    """The rows of a pair list, and what is wrong with others, a line for each.
+    """Read the rows of a pair list, and what is wrong with others, a line for each.
 
     Raises: InputError if the file cannot be read, or its header names neither `from,to` nor
         `source,target`.
     """
     try:
-        text = read_bytes(path, "pair list").decode("utf-8-sig")
+        text = read_bytes(path, "pair list").decode("utf-8-sig")  # Excel writes a byte order mark
     except UnicodeDecodeError as error:
         raise InputError(f"pair list {path} is not text: {error.reason}") from error
     reader = csv.reader(text.splitlines())
     header = [word.strip() for word in next(reader, [])]
+    # others may stand there as well, such as the row numbers that pandas writes
     columns = next((pair for pair in HEADERS if set(pair) <= set(header)), None)
     if columns is None:
         raise InputError(
@@ -131,14 +119,15 @@ def read_pair_list(path: Path) -> tuple[list[Row], list[str]]:
             " or source,target"
         )
     first, second = (header.index(column) for column in columns)
-    rows, problems = [], []
+    rows: list[Row] = []
+    problems = []
     for cells in reader:
         if not any(cell.strip() for cell in cells):
             continue
-        cells += [""] * (len(header) - len(cells))
+        cells += [""] * (len(header) - len(cells))  # short rows lack their last cells
         names = cells[first].strip(), cells[second].strip()
         if all(names):
-            rows.append(Row(reader.line_num, *names))
+            rows.append((reader.line_num, *names))
         else:
             empty = columns[names.index("")]
             problems.append(f"line {reader.line_num}: `{empty}` is empty")
@@ -153,17 +142,17 @@ def open_pairs(
     limit: int | None = None,
     thorough: bool = True,
     skip_broken: bool = False,
-    done: Callable[[int, int], None] = lambda _count, _total: None,
+    done: Done = ignore_done,
 ) -> PairList:
-    """The pairs of a list, after every photo and IUV it names was looked at.
+    """Open the pairs of a list, after every photo and IUV it names was checked.
 
     Args:
-        images: the folder that the names are relative to; None: the list's own.
-        limit: only the first so many pairs.
-        thorough: decode every file; else only see that it is there (the digest is then of names
+        images: The folder that the names are relative to; None: the list's own.
+        limit: Only the first so many pairs.
+        thorough: Decode every file; else only see that it is there (the digest is then of names
             and sizes in bytes).
-        skip_broken: leave pairs with a problem out instead of raising.
-        done: called with how many more pictures of how many were looked at.
+        skip_broken: Leave pairs with a problem out instead of raising.
+        done: Called with how many more pictures of how many were checked.
     Raises: InputError listing what is wrong, all at once; or if no pair is left.
     """
     rows, problems = read_pair_list(path)
@@ -171,39 +160,57 @@ def open_pairs(
     if not folder.is_dir():
         raise InputError(f"folder of photos {folder} does not exist")
     entries = []
-    for row in rows[:limit]:
-        source, target = (
-            PhotoFile(name, folder / name, iuv_order) for name in (row.source, row.target)
-        )
-        entries.append(Entry(f"line {row.line}", Pair(source, target, group=row.source)))
-    look = _fingerprint if thorough else _glance
-    return check_pairs(path.name, entries, problems, look=look, skip_broken=skip_broken, done=done)
+    for line, *names in rows[:limit]:
+        source, target = (PhotoFile(name, folder / name, iuv_order) for name in names)
+        entries.append((f"line {line}", Pair(source, target, group=source.name)))
+    check = _digest_pixels if thorough else _digest_sizes
+    return check_pairs(
+        path.name, entries, problems, check=check, skip_broken=skip_broken, done=done
+    )
+
+
+def _digest_pixels(picture: Picture) -> str:
+    return picture.load().digest()
+
+
+def _digest_sizes(picture: Picture) -> str:
+    """The sizes in bytes of a photo that is there, and of its IUV. Raises: InputError."""
+    assert isinstance(picture, PhotoFile)
+    if not picture.path.is_file():
+        raise InputError(f"photo {picture.path} does not exist")
+    return ",".join(str(path.stat().st_size) for path in (picture.path, picture.iuv_path))
 
 
 def check_pairs(
     name: str,
-    entries: Sequence[Entry],
+    entries: Sequence[tuple[str, Pair]],
     problems: Sequence[str] = (),
     *,
-    look: Callable[[Picture], str] | None = None,
+    check: Callable[[Picture], str] = _digest_pixels,
     skip_broken: bool,
-    done: Callable[[int, int], None] = lambda _count, _total: None,
+    done: Done = ignore_done,
 ) -> PairList:
-    """The pairs whose pictures are all right; each picture is looked at once.
+    """Keep the pairs whose pictures are all right; each picture is checked once.
 
     Args:
-        problems: what is wrong already, a line for each.
-        look: gives a picture's digest or raises InputError; None: load it.
-    Raises: InputError as `open_pairs`.
+        entries: Where each pair was asked for, and the pair.
+        problems: What is wrong already, a line for each.
+        check: Gives a picture's digest or raises InputError.
+    Raises: InputError as `open_pairs` does.
     """
     places: dict[str, list[str]] = defaultdict(list)
     pictures: dict[str, Picture] = {}
-    for entry in entries:
-        for picture in (entry.pair.source, entry.pair.target):
+    for where, pair in entries:
+        for picture in (pair.source, pair.target):
             pictures[picture.name] = picture
-            places[picture.name].append(entry.where)
-    broken, digests = _look_at(pictures, look or _fingerprint, done)
-    broken |= _find_clashes(pictures)
+            places[picture.name].append(where)
+    answers = _check_pictures(pictures, check, done)
+    broken = {key: str(found) for key, found in answers.items() if isinstance(found, InputError)}
+    owners: dict[str, str] = {}
+    for each in pictures:  # results could not tell those apart whose short names are the same
+        owner = owners.setdefault(flat_stem(each), each)
+        if owner != each:
+            broken[each] = f"{each} and {owner} are both {flat_stem(each)} for short; rename one"
     lines = [*problems]
     for picture_name, reason in broken.items():
         where = places[picture_name]
@@ -211,22 +218,20 @@ def check_pairs(
         lines.append(f"{where[0]}{more}: {reason}")
     if lines and not skip_broken:
         raise InputError(list_problems(name, lines))
-    kept = [
-        entry.pair
-        for entry in entries
-        if entry.pair.source.name not in broken and entry.pair.target.name not in broken
-    ]
+    kept, content = [], hashlib.sha256()
+    for _, pair in entries:
+        names = pair.source.name, pair.target.name
+        if broken.keys().isdisjoint(names):
+            kept.append(pair)
+            for picture_name in names:
+                content.update(f"{picture_name}\0{answers[picture_name]}\n".encode())
     if not kept:
         raise InputError(list_problems(f"{name} holds no pair that can be used", lines))
-    content = hashlib.sha256()
-    for pair in kept:
-        for picture in (pair.source, pair.target):
-            content.update(f"{picture.name}\0{digests[picture.name]}\n".encode())
-    return PairList(name, kept, content.hexdigest(), lines)
+    return PairList(name, kept, content.hexdigest(), tuple(lines))
 
 
 def list_problems(what: str, problems: Sequence[str]) -> str:
-    """A message with the first problems, a line for each, and how many more there are."""
+    """Write a message with the first problems, a line for each, and how many more there are."""
     if not problems:
         return what
     count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
@@ -236,55 +241,24 @@ def list_problems(what: str, problems: Sequence[str]) -> str:
     return "\n".join([*lines, "mend them, or leave their pairs out with --skip-broken"])
 
 
-def _look_at(
-    pictures: Mapping[str, Picture],
-    look: Callable[[Picture], str],
-    done: Callable[[int, int], None],
-) -> tuple[dict[str, str], dict[str, str]]:
+def _check_pictures(
+    pictures: Mapping[str, Picture], check: Callable[[Picture], str], done: Done
+) -> dict[str, InputError | str]:
     """For each picture's name: what is wrong with it, or its digest."""
-    broken: dict[str, str] = {}
-    digests: dict[str, str] = {}
 
     def try_one(picture: Picture) -> InputError | str:
         try:
-            return look(picture)
+            return check(picture)
         except InputError as error:
             return error
 
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         try:
-            found = pool.map(try_one, pictures.values())
-            for picture_name, answer in zip(pictures, found, strict=True):
-                if isinstance(answer, InputError):
-                    broken[picture_name] = str(answer)
-                else:
-                    digests[picture_name] = answer
+            answers: dict[str, InputError | str] = {}
+            for name, answer in zip(pictures, pool.map(try_one, pictures.values()), strict=True):
+                answers[name] = answer
                 done(1, len(pictures))
+            return answers
         except BaseException:
-            pool.shutdown(cancel_futures=True)
+            pool.shutdown(cancel_futures=True)  # whoever stops it need not wait for all the rest
             raise
-    return broken, digests
-
-
-def _find_clashes(pictures: Mapping[str, Picture]) -> dict[str, str]:
-    """What is wrong with pictures that results could not tell apart by name."""
-    owners: dict[str, str] = {}
-    clashes = {}
-    for name in pictures:
-        owner = owners.setdefault(flat_stem(name), name)
-        if owner != name:
-            clashes[name] = f"{name} and {owner} are both {flat_stem(name)} for short; rename one"
-    return clashes
-
-
-def _fingerprint(picture: Picture) -> str:
-    return picture.load().digest()
-
-
-def _glance(picture: Picture) -> str:
-    """Names and sizes in bytes, of a photo that is there. Raises: InputError."""
-    assert isinstance(picture, PhotoFile)
-    if not picture.path.is_file():
-        raise InputError(f"photo {picture.path} does not exist")
-    sizes = [path.stat().st_size for path in (picture.path, picture.iuv_path)]
-    return ",".join(map(str, sizes))

@@ -10,11 +10,13 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.drawing.source import read_person
 from motion_transfer.errors import InputError
-from motion_transfer.media.image import Photo, read_photo
-from motion_transfer.media.iuv_image import ChannelOrder
-from motion_transfer.render.beside import list_iuv_names
-from motion_transfer.render.source import read_person
+from motion_transfer.media.iuv.formats import ChannelOrder, list_iuv_names
+from motion_transfer.media.pictures.photo import Photo, read_photo
+
+Image = UInt8[np.ndarray, "H W 3"]
+Plane = UInt8[np.ndarray, "H W"]
 
 
 @dataclass(frozen=True)
@@ -28,16 +30,16 @@ class PersonPicture:
     """
 
     name: str
-    rgb: UInt8[np.ndarray, "H W 3"]
-    iuv: UInt8[np.ndarray, "H W 3"]
-    alpha: UInt8[np.ndarray, "H W"] | None
+    rgb: Image
+    iuv: Image
+    alpha: Plane | None
 
     def as_photo(self) -> Photo:
-        """As a renderer's source has it."""
+        """Make it what a renderer's source is made of."""
         return Photo(Path(self.name), self.rgb, self.alpha, turned=False)
 
     def digest(self) -> str:
-        """SHA-256 of the pixels, so that another encoding of the same picture is the same."""
+        """Compute the SHA-256 of the pixels, which another encoding of the picture shares."""
         content = hashlib.sha256()
         for plane in (self.rgb, self.iuv, self.alpha):
             if plane is not None:
@@ -49,7 +51,7 @@ class Picture(Protocol):
     """Where a picture can be had.
 
     Attributes:
-        name: the same picture always has the same one; it may hold `/`.
+        name: The same picture always has the same one; it may hold `/`.
     """
 
     @property
@@ -74,11 +76,10 @@ class PhotoFile:
 
     @property
     def iuv_path(self) -> Path:
-        """Raises: InputError if there is none."""
+        """The file of its IUV. Raises: InputError if there is none."""
         candidates = list_iuv_names(self.path)
-        for candidate in candidates:
-            if candidate.exists():
-                return candidate
+        if found := next(filter(Path.exists, candidates), None):
+            return found
         raise InputError(
             f"photo {self.path} has no IUV: neither {candidates[0].name} nor {candidates[1].name}"
             " is beside it"
@@ -95,22 +96,26 @@ class PhotoFile:
         return self.alpha_path.exists() or read_photo(self.path, "photo").alpha is not None
 
     def load(self) -> PersonPicture:
-        """Raises: InputError if a file is missing or broken, sizes differ, or nobody is seen."""
+        """Read photo, IUV and alpha.
+
+        Raises: InputError if a file is missing or broken, sizes differ, or nobody is seen.
+        """
         photo = read_photo(self.path, "photo")
         iuv = read_person(photo, self.iuv_path, "largest", self.iuv_order, "photo")
         if not iuv.any():
             raise InputError(f"photo {self.path}: its alpha leaves nobody of its IUV")
-        alpha = photo.alpha if photo.alpha is not None else self._alpha_beside(photo)
+        alpha, path = photo.alpha, self.alpha_path
+        if alpha is None and path.exists():
+            alpha = np.ascontiguousarray(read_photo(path, "alpha").rgb[..., 0])
+            if alpha.shape != photo.rgb.shape[:2]:
+                raise InputError(
+                    f"alpha {path} is {alpha.shape[1]} x {alpha.shape[0]}, but {photo.path} is"
+                    f" {photo.rgb.shape[1]} x {photo.rgb.shape[0]}"
+                )
         return PersonPicture(self.name, photo.rgb, iuv, alpha)
 
-    def _alpha_beside(self, photo: Photo) -> UInt8[np.ndarray, "H W"] | None:
-        path = self.alpha_path
-        if not path.exists():
-            return None
-        alpha = read_photo(path, "alpha").rgb[..., 0]
-        if alpha.shape != photo.rgb.shape[:2]:
-            raise InputError(
-                f"alpha {path} is {alpha.shape[1]} x {alpha.shape[0]}, but {photo.path} is"
-                f" {photo.rgb.shape[1]} x {photo.rgb.shape[0]}"
-            )
-        return np.ascontiguousarray(alpha)
+
+def lay_over(rgb: Image, alpha: Plane, colour: tuple[int, int, int]) -> Image:
+    """Lay a picture over one colour, as its alpha says."""
+    weight = alpha[..., None].astype(np.float32) / 255
+    return (rgb * weight + np.array(colour, np.float32) * (1 - weight)).round().astype(np.uint8)

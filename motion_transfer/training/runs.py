@@ -12,21 +12,23 @@ RUN/weights.safetensors for `mt run`, when the run ends or is stopped
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motion_transfer.errors import InputError, OutputError, WeightsError
-from motion_transfer.media.publish import explain_disk_errors, publish
-from motion_transfer.training.config import TrainConfig
-from motion_transfer.training.config_file import build_config, read_settings, write_toml
-from motion_transfer.training.events import Listener
-from motion_transfer.training.extra import require_training
-from motion_transfer.training.sources import TrainingData, open_training_data
-from motion_transfer.training.terms import load_judges
+from motion_transfer.extras import require_extra
+from motion_transfer.media.growing import write_whole
+from motion_transfer.media.publish import explain_disk_errors
+from motion_transfer.training.config import TrainConfig, build_config, read_settings, write_toml
+from motion_transfer.training.pairs import Done, ignore_done
+from motion_transfer.training.progress import Listener
+from motion_transfer.training.sources import open_training_data
+from motion_transfer.training.step import load_judges
+from motion_transfer.weights import SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import load_checkpoint
-from motion_transfer.weights.shipped import SHIPPED, find_weights
 from nhrr_core import NeuralReRenderer
 from nhrr_core.config import PRESETS
 
@@ -36,8 +38,6 @@ if TYPE_CHECKING:  # it needs the `train` extra
 CONFIG_FILE = "train.toml"
 MAY_CHANGE = ("run.steps", "run.licence", "data.people_cache", "speed.", "keeping.")
 """What a run that goes on may have otherwise than it began."""
-
-Count = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,10 @@ class PlannedRun:
 
 
 def plan_new_run(folder: Path, settings: Mapping[str, Any]) -> PlannedRun:
-    """A run that begins.
+    """Plan a run that begins.
 
     Args:
-        settings: `section.key`, see `motion_transfer.training.config_file`.
+        settings: By `section.key`, see `motion_transfer.training.config`.
     Raises: OutputError if the folder holds something; InputError.
     """
     if is_first_process() and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -61,14 +61,12 @@ def plan_new_run(folder: Path, settings: Mapping[str, Any]) -> PlannedRun:
             f"{folder} exists already; go on with it by mt train --resume {folder}, or choose"
             " another name"
         )
-    init = None
-    if settings.get("run.init"):
-        init = _load_init(str(settings["run.init"]))
+    init = _load_init(str(settings["run.init"])) if settings.get("run.init") else None
     return PlannedRun(folder, build_config(settings, model=init and init.config), init)
 
 
 def plan_resumed_run(folder: Path, changes: Mapping[str, Any]) -> PlannedRun:
-    """A run that goes on from its last checkpoint, or from the start if there is none yet.
+    """Plan a run that goes on from its last checkpoint, or from the start if there is none yet.
 
     Raises: InputError if it is no run, or a change would make it another.
     """
@@ -77,6 +75,7 @@ def plan_resumed_run(folder: Path, changes: Mapping[str, Any]) -> PlannedRun:
         raise InputError(f"{folder} is no run: it has no {CONFIG_FILE}; begin one with -o {folder}")
     settings = read_settings(file)
     for name, value in changes.items():
+        # what is said again and is the same is no change
         if not name.startswith(MAY_CHANGE) and settings.get(name) != value:
             raise InputError(
                 f"{name} was {settings.get(name)!r} when the run began and cannot become"
@@ -94,45 +93,37 @@ def prepare(
     planned: PlannedRun,
     listener: Listener,
     *,
-    photographed: Count = lambda _count, _total: None,
-    looked: Count = lambda _count, _total: None,
+    photographed: Done = ignore_done,
+    checked: Done = ignore_done,
 ) -> Trainer:
-    """Everything up to the first step: networks, data, the last checkpoint.
+    """Prepare everything up to the first step: networks, data, the last checkpoint.
 
     Args:
-        photographed, looked: progress of `open_training_data`.
+        photographed, checked: Progress of `open_training_data`.
     Raises: InputError if anything is missing or does not fit.
     """
     config, folder = planned.config, planned.folder
-    require_training(tensorboard=config.keeping.tensorboard)
+    require_extra("train")  # asked for before minutes are spent on data
+    if config.keeping.tensorboard:
+        require_extra("tensorboard")
     judges = load_judges(config.losses)
     from motion_transfer.training.trainer import Trainer
 
-    def open_data() -> TrainingData:
-        data = open_training_data(
-            config.data,
-            run=folder,
-            seed=config.run.seed,
-            photographed=photographed,
-            looked=looked,
-        )
-        if config.model.alpha:
-            data.require_alpha()
-        return data
-
+    open_data = partial(
+        open_training_data, config, folder, photographed=photographed, checked=checked
+    )
     if is_first_process():
         with explain_disk_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
-            temporary = folder / f".{CONFIG_FILE}.part"
-            temporary.write_text(write_toml(config))
-            publish(temporary, folder / CONFIG_FILE)
+            write_whole(folder / CONFIG_FILE, write_toml(config))
     return Trainer(
         config, folder, judges=judges, open_data=open_data, listener=listener, init=planned.init
     )
 
 
 def is_first_process() -> bool:
-    """Of several that `accelerate launch` started; it alone writes and talks."""
+    """Tell the first of several that `accelerate launch` started: it alone writes and talks."""
+    # read from the environment, as it is asked before accelerate is imported
     return os.environ.get("RANK", "0") == "0"
 
 

@@ -2,32 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import hashlib
 from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib.metadata import version
 from pathlib import Path
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.video import VIDEO_SUFFIXES
-from motion_transfer.people.album import AlbumOptions, write_album
-from motion_transfer.training.clips import ClipFrame, open_clip_pairs
-from motion_transfer.training.config import PEOPLE, DataSettings
+from motion_transfer.extras import require_extra
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES
+from motion_transfer.people import (
+    AlbumOptions,
+    DressedPerson,
+    IuvNoise,
+    PeopleStream,
+    Split,
+    write_album,
+)
+from motion_transfer.training.clips import IUV_ENDINGS, ClipFrame, list_files, open_clip_pairs
+from motion_transfer.training.config import PEOPLE, DataSettings, TrainConfig
 from motion_transfer.training.pairs import (
-    Entry,
+    Done,
     Pair,
     PairList,
+    Pairs,
     check_pairs,
     list_problems,
     open_pairs,
 )
-from motion_transfer.training.pictures import PhotoFile
-from motion_transfer.training.streamed import StreamedPairs
+from motion_transfer.training.pictures import PersonPicture, PhotoFile
+from motion_transfer.version import __version__
 
-PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
-NOT_PHOTOS = ("_IUV", "_iuv", "_alpha")
+NOT_PHOTOS = (*IUV_ENDINGS, "_alpha")
 SOURCES_EACH = 4
 """How many other photos of a person each photo is the target of."""
 
-Count = Callable[[int, int], None]
+ENOUGH = 2**31  # more pairs than any run takes
+HELD_OUT_SEED, HELD_OUT_SIZE = 2020, (256, 256)
+DRAWN_BY = ("anny", "warp-lang", "numpy", "opencv-contrib-python-headless")
+"""Packages whose versions decide, with ours, what people look like."""
 
 
 @dataclass(frozen=True)
@@ -35,28 +48,34 @@ class TrainingData:
     """Pairs, and what they are.
 
     Attributes:
-        description: words that are stored with the weights.
-        digest: changes whenever a pair does; a run goes on only with what it began with.
-        dropped: a line for each problem whose pairs were left out.
+        description: Words that are stored with the weights.
+        digest: Changes whenever a pair does; a run goes on only with what it began with.
+        dropped: A line for each problem whose pairs were left out.
     """
 
-    pairs: Sequence[Pair]
+    pairs: Pairs
     description: str
     digest: str
     dropped: tuple[str, ...] = ()
 
-    def require_alpha(self) -> None:
-        """See that targets have an alpha; those of people always do.
 
-        Raises: InputError listing those that have none.
-        """
-        targets = {
-            pair.target.name: pair.target
-            for pair in (() if getattr(self.pairs, "endless", False) else self.pairs)
-        }
+def open_training_data(
+    config: TrainConfig, run: Path, *, photographed: Done, checked: Done
+) -> TrainingData:
+    """Find out what `data.source` names, and check all of it.
+
+    Args:
+        run: The run's folder, which keeps synthetic people unless the settings say otherwise.
+        photographed, checked: Called with how many more people, or pictures, are done, of how many.
+    Raises: InputError listing missing IUV, missing members of pairs and broken files, all at once;
+        or missing alpha, where the model learns it.
+    """
+    data = _open_source(config, run, photographed, checked)
+    if config.model.alpha and not data.pairs.endless:  # people always have one
+        pairs = (data.pairs[number] for number in range(len(data.pairs)))
         lacking = [
             f"{name}: no alpha, neither its own nor STEM_alpha.png"
-            for name, target in targets.items()
+            for name, target in {pair.target.name: pair.target for pair in pairs}.items()
             if isinstance(target, ClipFrame)
             or (isinstance(target, PhotoFile) and not target.has_alpha)
         ]
@@ -65,22 +84,15 @@ class TrainingData:
                 list_problems("a model with alpha learns it from the data", lacking)
                 + "\nor train without alpha: --set model.alpha=false"
             )
+    return data
 
 
-def open_training_data(
-    settings: DataSettings, *, run: Path, seed: int, photographed: Count, looked: Count
-) -> TrainingData:
-    """Find out what `settings.source` names, and check all of it.
-
-    Args:
-        run: the run's folder, which keeps synthetic people unless the settings say otherwise.
-        photographed, looked: called with how many more people, or pictures, are done, of how many.
-    Raises: InputError listing missing IUV, missing members of pairs and broken files, all at once.
-    """
+def _open_source(config: TrainConfig, run: Path, photographed: Done, checked: Done) -> TrainingData:
+    settings = config.data
     if settings.source == PEOPLE:
-        return _open_people(settings, run, seed, photographed, looked)
+        return _open_people(settings, run, config.run.seed, photographed, checked)
     path = Path(settings.source)
-    common = {"skip_broken": settings.skip_broken, "done": looked}
+    common = {"skip_broken": settings.skip_broken, "done": checked}
     if path.is_file():
         images = Path(settings.images) if settings.images else None
         return _describe(open_pairs(path, images, **common), f"photos listed in {path.name}")
@@ -91,14 +103,38 @@ def open_training_data(
         )
     if (path / "pairs.csv").is_file():
         return _describe(open_pairs(path / "pairs.csv", **common), f"photos in {path.name}")
-    if any(file.suffix.lower() in VIDEO_SUFFIXES and _is_picture(file) for file in path.iterdir()):
+    if list_files(path, VIDEO_SUFFIXES, NOT_PHOTOS):
         pairs = open_clip_pairs(path, moments=settings.moments, **common)
         return _describe(pairs, f"clips in {path.name}")
     return _describe(_pair_photos(path, **common), f"photos of one person in {path.name}")
 
 
+def _describe(pairs: PairList, words: str) -> TrainingData:
+    return TrainingData(pairs, f"{len(pairs)} pairs: {words}", pairs.digest, pairs.dropped)
+
+
+def _pair_photos(folder: Path, *, skip_broken: bool, done: Done) -> PairList:
+    """Each photo of a folder as a target of others, spread evenly over it."""
+    names = [file.name for file in list_files(folder, PHOTO_SUFFIXES, NOT_PHOTOS)]
+    if len(names) < 2:
+        raise InputError(
+            f"data {folder} holds {len(names)} photos; a pair needs two, each with STEM_IUV.png"
+            " beside it"
+        )
+    photos = [PhotoFile(name, folder / name) for name in names]
+    others = len(names) - 1
+    # a set, as of few photos the same step comes several times
+    steps = sorted({1 + others * each // SOURCES_EACH for each in range(SOURCES_EACH)})
+    entries = [
+        (target.name, Pair(photos[(place + step) % len(photos)], target, group=target.name))
+        for place, target in enumerate(photos)
+        for step in steps
+    ]
+    return check_pairs(folder.name, entries, skip_broken=skip_broken, done=done)
+
+
 def _open_people(
-    settings: DataSettings, run: Path, seed: int, photographed: Count, looked: Count
+    settings: DataSettings, run: Path, seed: int, photographed: Done, checked: Done
 ) -> TrainingData:
     size = (settings.size_px, settings.size_px)
     if settings.people == 0:
@@ -114,7 +150,7 @@ def _open_people(
         noise=settings.noise,
     )
     write_album(options, lambda count: photographed(count, settings.people))
-    pairs = open_pairs(folder / "pairs.csv", thorough=False, done=looked)
+    pairs = open_pairs(folder / "pairs.csv", thorough=False, done=checked)
     found = len({Path(pair.source.name).parent for pair in pairs})
     if found != settings.people:  # an album is only ever added to
         raise InputError(
@@ -124,34 +160,79 @@ def _open_people(
     return _describe(pairs, f"{settings.people} synthetic people, {settings.views} photos each")
 
 
-def _describe(pairs: PairList, words: str) -> TrainingData:
-    return TrainingData(pairs, f"{len(pairs)} pairs: {words}", pairs.digest, pairs.dropped)
+def held_out_pairs(count: int) -> PairList:
+    """Make the built-in set for evaluation: people of the split that training never draws from.
+
+    Its digest stands for the pixels without drawing them: everything follows from the seed, the
+    count and the versions of what draws.
+    Raises: InputError without the extra.
+    """
+    people = StreamedPairs(seed=HELD_OUT_SEED, size=HELD_OUT_SIZE, noise=0.0, split="held-out")
+    made_of = [HELD_OUT_SEED, HELD_OUT_SIZE, count, __version__, *map(version, DRAWN_BY)]
+    digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
+    return PairList("people (held-out)", [people[number] for number in range(count)], digest)
 
 
-def _pair_photos(folder: Path, *, skip_broken: bool, done: Count) -> PairList:
-    """Each photo of a folder as a target of others, spread evenly over it."""
-    names = sorted(
-        file.name
-        for file in folder.iterdir()
-        if file.suffix.lower() in PHOTO_SUFFIXES and _is_picture(file)
+@dataclass(frozen=True, kw_only=True)
+class StreamedPairs:
+    """Pairs of synthetic people who are made when they are asked for, without end.
+
+    Pair n shows person n, first as source, then as target. Raises: InputError without the extra.
+
+    Attributes:
+        size: (width, height) in px.
+        noise: The share of the photos whose IUV has the faults of DensePose's.
+    """
+
+    seed: int
+    size: tuple[int, int]
+    noise: float
+    split: Split = "train"
+    endless: bool = True
+
+    def __post_init__(self) -> None:
+        require_extra("people")
+
+    def __len__(self) -> int:
+        return ENOUGH
+
+    def __getitem__(self, index: int) -> Pair:
+        source, target = (StreamedPhoto(self, index, view) for view in (0, 1))
+        return Pair(source, target, group=str(index))
+
+
+@dataclass(frozen=True)
+class StreamedPhoto:
+    """One photo of one of them."""
+
+    people: StreamedPairs
+    number: int
+    view: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.number:06d}/{self.view}.png"
+
+    def load(self) -> PersonPicture:
+        """Take it; the same bytes each time."""
+        stream = _stream(self.people)
+        photo = stream.take(_dress(self.people, self.number), stream.shot(self.number, self.view))
+        return PersonPicture(self.name, photo.rgb, photo.iuv, photo.alpha)
+
+
+@cache
+def _stream(people: StreamedPairs) -> PeopleStream:
+    """Made where it is used: the body model does not travel to other processes."""
+    noise = IuvNoise.densepose() if people.noise else None
+    return PeopleStream(
+        seed=people.seed,
+        split=people.split,
+        size=people.size,
+        noise=noise,
+        noisy_share=people.noise,
     )
-    if len(names) < 2:
-        raise InputError(
-            f"data {folder} holds {len(names)} photos; a pair needs two, each with STEM_IUV.png"
-            " beside it"
-        )
-    photos = [PhotoFile(name, folder / name) for name in names]
-    steps = sorted(
-        {1 + (len(names) - 1) * step // SOURCES_EACH for step in range(SOURCES_EACH)}
-        & set(range(1, len(names)))
-    )
-    entries = [
-        Entry(target.name, Pair(photos[(place + step) % len(photos)], target, group=target.name))
-        for place, target in enumerate(photos)
-        for step in steps
-    ]
-    return check_pairs(folder.name, entries, skip_broken=skip_broken, done=done)
 
 
-def _is_picture(file: Path) -> bool:
-    return not file.stem.endswith(NOT_PHOTOS) and not file.name.startswith(".")
+@lru_cache(maxsize=8)  # both photos of a pair, in each of several threads
+def _dress(people: StreamedPairs, number: int) -> DressedPerson:
+    return _stream(people).dress(number)

@@ -1,31 +1,177 @@
-"""One update of both players. Tensors in, numbers out: no files, no devices chosen."""
+"""One step of a run: what the networks draw, what each judge says of it, who learns from that.
+
+Tensors in, numbers out: no files but the judges' own, no devices chosen.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
+from typing import NamedTuple
 
 import torch
+from jaxtyping import Float, UInt8
 from torch import Tensor, nn
+from torch.optim import Optimizer
 
-from motion_transfer.training.terms import (
-    Batch,
-    Drawn,
-    Judges,
-    Terms,
-    discriminator_term,
-    generator_terms,
+from motion_transfer.errors import WeightsError
+from motion_transfer.training.config import LossSettings
+from motion_transfer.training.faces import REMEDY, WHAT, FaceIdentity, load_sphereface
+from motion_transfer.training.feature_networks import (
+    FeatureNetwork,
+    load_efficientnet_lite0,
+    load_vgg19,
 )
-from nhrr_core import LossWeights, NeuralReRenderer, generator_loss
+from nhrr_core import (
+    LossWeights,
+    NeuralReRenderer,
+    adversarial_loss,
+    alpha_loss,
+    discriminator_loss,
+    generator_loss,
+    perceptual_loss,
+    texture_loss,
+)
+from nhrr_core.config import COLOUR_CHANNELS
+
+Batch = Mapping[str, Tensor]
+Terms = dict[str, Tensor]
 
 
-class Optimiser(Protocol):
-    """What is asked of an optimiser, torch's own or accelerate's around it."""
+class Generator(nn.Module):
+    """f, r and g in one forward pass, as training over several devices needs it."""
 
-    def step(self) -> object: ...
-    def zero_grad(self) -> object: ...
+    def __init__(self, model: NeuralReRenderer) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(
+        self,
+        texture: Float[Tensor, "B 3 T T"],
+        visibility: Float[Tensor, "B 1 T T"],
+        target_iuv: UInt8[Tensor, "B 3 S S"] | None,
+        clearance: Float[Tensor, "B 2 t t"] | None = None,
+    ) -> Drawn:
+        """Draw a batch; only the feature map where there is no target."""
+        # the grid of the sampler has more digits than bf16
+        feature_map = self.model.encode_texture(texture, visibility, clearance).float()
+        if target_iuv is None:
+            return Drawn(feature_map, None, None)
+        feature_image = self.model.feature_image(feature_map, target_iuv)
+        drawn = self.model.render_net(feature_image).float()
+        return Drawn(feature_map, feature_image, self.model.blend(drawn, feature_image))
+
+
+class Drawn(NamedTuple):
+    """What the generator made of a batch, in float32.
+
+    Attributes:
+        feature_map: B x D x T x T.
+        feature_image: B x C x S x S, what RenderNet read; None while only the map is trained.
+        image: B x K x S x S in [-1, 1], RGB and perhaps alpha; None while only the map is trained.
+    """
+
+    feature_map: Float[Tensor, "B D T T"]
+    feature_image: Float[Tensor, "B C S S"] | None
+    image: Float[Tensor, "B K S S"] | None
+
+
+@dataclass(frozen=True)
+class Judges:
+    """The frozen networks; None where the loss is left out."""
+
+    perceptual: FeatureNetwork | None = None
+    identity: FaceIdentity | None = None
+
+    def to(self, device: torch.device) -> Judges:
+        """Move them to a device."""
+        for network in (self.perceptual, self.identity):
+            if network is not None:
+                network.to(device)
+        return self
+
+
+def load_judges(settings: LossSettings) -> Judges:
+    """Load the networks that the losses ask for.
+
+    Raises: WeightsError or InputError naming the option that gives the network, and the one that
+        leaves the loss out; a loss is never dropped in silence.
+    """
+    perceptual = identity = None
+    if settings.perceptual == "vgg19":
+        perceptual = load_vgg19(Path(settings.vgg19_file) if settings.vgg19_file else None)
+    elif settings.perceptual == "efficientnet-lite0":
+        perceptual = load_efficientnet_lite0()
+    if settings.identity == "sphereface":
+        if not settings.sphereface_file:
+            raise WeightsError(f"{WHAT} are not given; {REMEDY}")
+        identity = FaceIdentity(load_sphereface(Path(settings.sphereface_file)))
+    return Judges(perceptual, identity)
+
+
+def shown_image(batch: Batch, drawn: Drawn) -> Float[Tensor, "B K S S"]:
+    """Lay a drawing with alpha over the background that the real image has, too: so it is judged.
+
+    So the colours at an outline are the person's alone, and fit any other background as well.
+    """
+    assert drawn.image is not None
+    if "target_background" not in batch:
+        return drawn.image
+    colours, alpha = drawn.image.tensor_split([COLOUR_CHANNELS], dim=1)
+    background = batch["target_background"][:, :, None, None]
+    return torch.cat([torch.lerp(background, colours, (alpha + 1) / 2), alpha], dim=1)
+
+
+def generator_terms(
+    batch: Batch, drawn: Drawn, judges: Judges, discriminator: nn.Module | None
+) -> Terms:
+    """Compute the terms of L_G that this batch and these judges give, not yet weighted.
+
+    Source: the paper, Sec. 3.5.
+    """
+    terms: Terms = {}
+    if "target_texture" in batch:
+        terms["texture"] = texture_loss(
+            drawn.feature_map,
+            (batch["source_texture"], batch["source_visibility"]),
+            (batch["target_texture"], batch["target_visibility"]),
+        )
+    if drawn.image is None or drawn.feature_image is None:
+        return terms
+    image = shown_image(batch, drawn)
+    colours, truth = image[:, :COLOUR_CHANNELS], batch["target_image"]
+    if judges.perceptual is not None:
+        with torch.no_grad():
+            wanted = judges.perceptual(truth)
+        found = judges.perceptual(colours)
+        terms["perceptual"] = perceptual_loss(
+            [layer.float() for layer in found],
+            [layer.float() for layer in wanted],
+            judges.perceptual.layer_weights,
+        )
+    if judges.identity is not None:
+        terms["identity"] = judges.identity(colours, truth, batch["target_iuv"]).float()
+    if "target_alpha" in batch:
+        terms["alpha"] = alpha_loss(image[:, COLOUR_CHANNELS:], batch["target_alpha"])
+    if discriminator is not None:
+        # detached: the feature image must be no way to please the discriminator
+        logits = discriminator(image, drawn.feature_image.detach())
+        terms["adversarial"] = adversarial_loss([scale.float() for scale in logits])
+    return terms
+
+
+def discriminator_term(batch: Batch, drawn: Drawn, discriminator: nn.Module) -> Tensor:
+    """Compute L_D of a batch; nothing of it reaches the generator."""
+    assert drawn.feature_image is not None
+    condition = drawn.feature_image.detach()
+    real = [batch[name] for name in ("target_image", "target_alpha") if name in batch]
+    # one pass over both: its instance norm looks at each image alone
+    pairs = torch.cat([torch.cat(real, dim=1), shown_image(batch, drawn).detach()])
+    logits = [scale.float() for scale in discriminator(pairs, condition.repeat(2, 1, 1, 1))]
+    halves = [scale.chunk(2) for scale in logits]
+    return discriminator_loss([real for real, _ in halves], [fake for _, fake in halves])
 
 
 @dataclass(frozen=True)
@@ -33,7 +179,7 @@ class Arithmetic:
     """How numbers are computed: where autocast holds, and what backward does.
 
     Attributes:
-        without_hooks: the module itself, out of what several devices wrapped it in.
+        without_hooks: Takes a module out of what several devices wrapped it in.
     """
 
     autocast: Callable[[], AbstractContextManager[None]]
@@ -46,9 +192,9 @@ class Players:
     """The networks that learn; without a discriminator there is no adversarial loss."""
 
     generator: nn.Module
-    generator_optimiser: Optimiser
+    generator_optimiser: Optimizer
     discriminator: nn.Module | None = None
-    discriminator_optimiser: Optimiser | None = None
+    discriminator_optimiser: Optimizer | None = None
 
 
 def set_stage(model: NeuralReRenderer, *, inpainting: bool) -> None:
@@ -72,59 +218,51 @@ def update(
     adversarial: bool,
     inpainting: bool = False,
 ) -> Terms:
-    """One step of the generator, then one of the discriminator against what was drawn.
+    """Make one step of the generator, then one of the discriminator against what was drawn.
 
     Args:
-        adversarial: whether the discriminator takes part yet.
-        inpainting: only the feature map is drawn and trained.
-    Returns: the terms, not weighted, detached; `total`; and `discriminator`.
+        adversarial: Whether the discriminator takes part yet.
+        inpainting: Whether only the feature map is drawn and trained.
+    Returns: The terms, not weighted, detached; `total`; and `discriminator`.
     """
     discriminator = players.discriminator if adversarial and not inpainting else None
     if discriminator is not None:
+        # the generator's backward must leave no gradients in its opponent
         discriminator.requires_grad_(False)
     with arithmetic.autocast():
-        drawn = Drawn(
-            *players.generator(
-                batch["source_texture"],
-                batch["source_visibility"],
-                None if inpainting else batch["target_iuv"],
-                batch.get("source_clearance"),
-            )
+        drawn = players.generator(
+            batch["source_texture"],
+            batch["source_visibility"],
+            None if inpainting else batch["target_iuv"],
+            batch.get("source_clearance"),
         )
         judge = discriminator and arithmetic.without_hooks(discriminator)
         terms = generator_terms(batch, drawn, judges, judge)
         total = generator_loss(terms, weights)
-    arithmetic.backward(total)
-    players.generator_optimiser.step()
-    players.generator_optimiser.zero_grad()
+    _learn(total, players.generator_optimiser, arithmetic)
     terms["total"] = total
-    if discriminator is not None:
-        terms["discriminator"] = _update_discriminator(batch, drawn, players, arithmetic)
+    if discriminator is not None and players.discriminator_optimiser is not None:
+        discriminator.requires_grad_(True)
+        with arithmetic.autocast():
+            terms["discriminator"] = discriminator_term(batch, drawn, discriminator)
+        _learn(terms["discriminator"], players.discriminator_optimiser, arithmetic)
     return {name: term.detach() for name, term in terms.items()}
 
 
-def _update_discriminator(
-    batch: Batch, drawn: Drawn, players: Players, arithmetic: Arithmetic
-) -> Tensor:
-    discriminator, optimiser = players.discriminator, players.discriminator_optimiser
-    assert discriminator is not None and optimiser is not None
-    discriminator.requires_grad_(True)
-    with arithmetic.autocast():
-        loss = discriminator_term(batch, drawn, discriminator)
+def _learn(loss: Tensor, optimiser: Optimizer, arithmetic: Arithmetic) -> None:
     arithmetic.backward(loss)
     optimiser.step()
     optimiser.zero_grad()
-    return loss
 
 
 class Average:
     """An exponential moving average of a model's weights; what is exported and sampled.
 
-    The average begins short, so that early weights are forgotten: the decay of step s is at most
-    (1 + s) / (10 + s). Batch norms' running averages are copied.
+    Batch norms' running averages are copied.
 
     Args:
-        model: what is averaged into: a copy of the one that is trained.
+        model: What is averaged into: a copy of the one that is trained.
+        decay: Of the average, once it has become long.
     """
 
     def __init__(self, model: NeuralReRenderer, decay: float) -> None:
@@ -134,6 +272,7 @@ class Average:
     @torch.no_grad()
     def update(self, model: NeuralReRenderer, step: int) -> None:
         """Take in the weights after a step (1 first)."""
+        # the average begins short, so that early weights are forgotten
         decay = min(self._decay, (1 + step) / (10 + step))
         ours: list[Tensor] = list(self.model.parameters())
         theirs: list[Tensor] = list(model.parameters())

@@ -1,7 +1,8 @@
 """Checkpoints: one safetensors file that carries its own configuration.
 
-Reading is three steps, each of which says what it refuses: file -> tensors and metadata, metadata
--> configuration, tensors -> model, every one of them and nothing else.
+Reading takes three steps, each of which says what it refuses: from the file to tensors and
+metadata, from metadata to the configuration, and from tensors to the model, all of them and no
+others.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from motion_transfer.errors import WeightsError
+from motion_transfer.media.work import digest_file
 from nhrr_core import ConfigError, ModelConfig, NeuralReRenderer
 
 FORMAT = "nhrr-1"
@@ -25,7 +27,7 @@ RESERVED = ("format", "config")
 
 @dataclass(frozen=True)
 class CheckpointInfo:
-    """What a checkpoint says of itself: configuration, notes (licence, data, ...), size."""
+    """What a checkpoint says of itself: its configuration, notes (licence, data, ...) and size."""
 
     path: Path
     config: ModelConfig
@@ -44,16 +46,13 @@ def save_checkpoint(
     """Write a model with its configuration, whole or not at all.
 
     Args:
-        notes: words about the weights, such as `licence` and `data`.
-        dtype: store floating-point tensors as this type, for example `torch.float16`.
+        notes: Words about the weights, such as `licence` and `data`.
+        dtype: What floating-point tensors are stored as; None: as they are.
     """
-    state = {
-        name: (tensor.to(dtype) if dtype and tensor.is_floating_point() else tensor)
-        .detach()
-        .cpu()
-        .contiguous()
-        for name, tensor in model.state_dict().items()
-    }
+    state = {}
+    for name, tensor in model.state_dict().items():
+        stored = dtype if tensor.is_floating_point() else None
+        state[name] = tensor.detach().to("cpu", stored).contiguous()
     metadata = {"format": FORMAT, "config": json.dumps(model.config.to_dict()), **(notes or {})}
     temporary = path.with_name(f".{path.name}.part")
     try:
@@ -65,7 +64,7 @@ def save_checkpoint(
 
 
 def load_checkpoint(path: Path) -> NeuralReRenderer:
-    """The model of a checkpoint, in evaluation mode, on the CPU, in float32.
+    """Load the model of a checkpoint, in evaluation mode, on the CPU, in float32.
 
     Raises: WeightsError if the file is missing, truncated, not a checkpoint of this model, or its
         tensors are not exactly those that its configuration calls for.
@@ -79,7 +78,7 @@ def load_checkpoint(path: Path) -> NeuralReRenderer:
 
 
 def list_misfits(network: nn.Module, state: Mapping[str, Tensor]) -> str:
-    """What keeps tensors from being exactly those of a network, the first three; else empty."""
+    """List up to three things that keep tensors from being exactly those of a network; else ""."""
     wanted = network.state_dict()
     problems = [f"{name} is missing" for name in wanted if name not in state]
     problems += [f"{name} is unknown" for name in state if name not in wanted]
@@ -91,8 +90,13 @@ def list_misfits(network: nn.Module, state: Mapping[str, Tensor]) -> str:
     return "; ".join(problems[:3]) + ("; ..." if len(problems) > 3 else "")
 
 
+def digest_weights(path: Path) -> str:
+    """Compute the SHA-256 of a checkpoint, hexadecimal. Raises: InputError if it cannot be read."""
+    return digest_file(path, "weights")
+
+
 def inspect_checkpoint(path: Path) -> CheckpointInfo:
-    """What a checkpoint holds, without reading its tensors. Raises: WeightsError."""
+    """Tell what a checkpoint holds, without reading its tensors. Raises: WeightsError."""
     return _read(path, with_tensors=False)[0]
 
 
@@ -109,7 +113,8 @@ def _read(path: Path, *, with_tensors: bool) -> tuple[CheckpointInfo, dict[str, 
             f"weights {path} are not a whole safetensors file ({error}); download or export again"
         ) from error
     config = _read_config(path, metadata)
-    notes = {key: value for key, value in metadata.items() if key not in RESERVED}
+    # safetensors tells them in an order that changes from run to run
+    notes = {key: metadata[key] for key in sorted(metadata) if key not in RESERVED}
     count = sum(torch.Size(shape).numel() for shape in shapes.values())
     return CheckpointInfo(path, config, notes, len(shapes), count), state
 

@@ -203,10 +203,10 @@ def test_missing_results_are_listed_or_their_pairs_skipped_for_all(
 
 BAD = {
     "no output": (["--pairs", "pairs.csv"], "Missing option '-o'"),
-    "no pairs": (["-o", "out"], "Give one of --pairs, --clips and --protocol"),
+    "no pairs": (["-o", "out"], "give one of --pairs, --clips and --protocol"),
     "both": (
         ["-o", "out", "--pairs", "pairs.csv", "--clips", "."],
-        "Give one of --pairs, --clips and --protocol",
+        "give one of --pairs, --clips and --protocol",
     ),
     "no method": (["-o", "out", "--pairs", "pairs.csv"], "nothing to evaluate; give --weights"),
     "renderer unknown": (
@@ -227,7 +227,7 @@ BAD = {
     ),
     "weights missing": (
         ["-o", "out", "--pairs", "pairs.csv", "--weights", "none.safetensors", *METRICS],
-        "weights none.safetensors do not exist",
+        "weights none.safetensors does not exist",
     ),
     "list missing": (
         ["-o", "out", "--pairs", "none.csv", "--renderer", "texture", *METRICS],
@@ -245,7 +245,7 @@ BAD = {
             "x",
             *METRICS,
         ],
-        "channel order 'x'",
+        "iuv_order is 'x'; supported are iuv, vui",
     ),
 }
 
@@ -288,13 +288,13 @@ def test_a_file_that_breaks_meanwhile_leaves_nothing_behind(
 ) -> None:
     from motion_transfer.evaluation import evaluate
 
-    wait = evaluate.make_labels_unique
+    wait = evaluate.open_candidates
 
-    def damage(*arguments) -> None:
+    def damage(*arguments):
         (studio.folder / "c.png").write_bytes(b"")
-        wait(*arguments)
+        return wait(*arguments)
 
-    monkeypatch.setattr(evaluate, "make_labels_unique", damage)
+    monkeypatch.setattr(evaluate, "open_candidates", damage)
     out = studio.folder / "new/out"
     result = mt("eval", "--pairs", pairs, "--renderer", "texture", *METRICS, "-o", out)
     assert (result.code, result.out) == (2, "")

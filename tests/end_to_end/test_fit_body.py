@@ -12,12 +12,12 @@ from PIL import Image
 
 from motion_transfer import RenderOptions, render_video
 from motion_transfer.batch.active import scan_name
+from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.interface import Box
+from motion_transfer.estimate.blazepose.retarget import BONES, BodyFit
 from motion_transfer.estimate.opening import open_estimator
-from motion_transfer.estimate.proportions import BONES, BodyFit
-from motion_transfer.render import body_match, photo_person, picture_driver
-from motion_transfer.render.events import Stage
+from motion_transfer.events import Stage
+from motion_transfer.render import picture_driver, source
 
 SIZE = (128, 160)
 TOP, FEET = 10, 110
@@ -42,7 +42,7 @@ def estimator(monkeypatch: pytest.MonkeyPatch) -> None:
     def opened(name: str, model: Path | None, *, frame_rate=None, fit: BodyFit | None = None):
         return StandingEstimator(fit)
 
-    for module in (body_match, photo_person, picture_driver):
+    for module in (source, picture_driver):
         monkeypatch.setattr(module, "open_estimator", opened)
 
 

@@ -12,8 +12,8 @@ from estimate_stubs import RED, scene, write_red_model
 from PIL import Image
 from skimage import data
 
-from motion_transfer.estimate.interface import Box
-from motion_transfer.media.iuv_stream import open_reader, open_stream
+from motion_transfer.drawing.person import Box
+from motion_transfer.media.iuv.opening import open_reader, open_stream
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
 

@@ -74,11 +74,11 @@ def test_bad_input_is_one_line(mt, studio):
     ],
 )
 def test_without_the_extra_the_command_that_installs_it_is_said(studio, mt, monkeypatch, arguments):
-    from motion_transfer.people import extra
+    from motion_transfer import extras
 
     studio.source("a")
     monkeypatch.chdir(studio.folder)
-    monkeypatch.setattr(extra, "find_spec", lambda _name: None)
+    monkeypatch.setattr(extras, "find_spec", lambda _name: None)
     outcome = mt(*arguments)
     assert outcome.code == 2
     assert "pip install 'motion-transfer[people]'" in outcome.err

@@ -14,10 +14,10 @@ from PIL import Image
 from skimage import data
 
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.extra import require_estimate
-from motion_transfer.estimate.iuv_loss import OTHER_SIDE, score_iuv
-from motion_transfer.estimate.model_files import MODEL_FILES, find_model
-from motion_transfer.media.iuv_stream import read_single_iuv
+from motion_transfer.estimate.models import MODEL_FILES, find_model
+from motion_transfer.extras import require_extra
+from motion_transfer.media.iuv.opening import read_single_iuv
+from motion_transfer.training.iuv.trainer import OTHER_SIDE, score_iuv
 from nhrr_core.iuv import PART_NAMES
 
 ASTRONAUT = Path(str(files("motion_transfer.demo") / "astronaut.jpg"))
@@ -31,7 +31,7 @@ MAN = (slice(170, 460), slice(170, 290))
 def models() -> None:
     """BlazePose's files are fetched once a machine."""
     try:
-        require_estimate()
+        require_extra("estimate")
         for file in MODEL_FILES:
             find_model(file)
     except InputError as error:

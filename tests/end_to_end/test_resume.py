@@ -17,9 +17,8 @@ from processes import wait_until_gone
 
 from motion_transfer import render_video
 from motion_transfer.errors import InputError
-from motion_transfer.media.journal import Journal
-from motion_transfer.media.work import work_path
-from motion_transfer.render.events import FramesDone, Notice, Stage, Started
+from motion_transfer.events import FramesDone, Notice, Stage, Started
+from motion_transfer.media.work import Journal, work_path
 from motion_transfer.render.plan import CHUNK_FRAMES
 
 FRAMES = 3 * CHUNK_FRAMES + 11

@@ -14,12 +14,12 @@ from PIL import Image
 from skimage import data
 
 from motion_transfer import Garment, render_video
+from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.interface import Box
+from motion_transfer.events import Notice, Stage
 from motion_transfer.media.work import WorkFolder, work_path
-from motion_transfer.render.events import Notice, Stage
-from motion_transfer.render.options import RenderOptions
-from motion_transfer.render.source import prepare_source
+from motion_transfer.render.options import SourceOptions
+from motion_transfer.render.source import read_source
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
 
@@ -206,9 +206,9 @@ def test_shots_have_their_own_windows(tmp_path: Path, red: dict, me: Path, size:
         assert min(heights[5:]) > 0.95 * 2 * (far.bottom - far.top)
 
 
-def test_the_source_ends_where_alpha_does(tmp_path: Path, red: dict, me: Path) -> None:
-    options = RenderOptions(source=me, driver=me, output=tmp_path / "out.png", **red)
-    source = prepare_source(options, 64)
+def test_the_source_ends_where_alpha_does(red_model: Path, me: Path) -> None:
+    options = SourceOptions(source=me, estimator="densepose", estimator_model=red_model)
+    source = read_source(options, 64)
     assert source.alpha is not None and source.iuv_path is None
     colours = source.texture[0].permute(1, 2, 0)[source.visibility[0, 0] > 0].numpy()
     reddish = (colours[:, 0] > 0.7) & (colours[:, 1:].max(1) < -0.7)

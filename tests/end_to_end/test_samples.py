@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from global_uv import iuv_to_global
 from PIL import Image
 
 from motion_transfer import RenderReport, render_video
-from motion_transfer.media.global_uv import global_to_iuv, iuv_to_global
-from motion_transfer.media.iuv_convert import ConvertOptions, convert_iuv
-from motion_transfer.media.iuv_image import decide_order, read_raw_iuv, to_iuv
-from motion_transfer.media.iuv_stream import open_reader, open_stream
-from motion_transfer.render.person import choose_person, find_people, isolate
+from motion_transfer.drawing.person import choose_person, find_people, isolate
+from motion_transfer.media.iuv.convert import ConvertOptions, convert_iuv
+from motion_transfer.media.iuv.global_uv import global_to_iuv
+from motion_transfer.media.iuv.image import read_raw_iuv
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.media.iuv.stream import decide_order, to_iuv
 
 TORSO, LEGS = (1, 2), (7, 8, 9, 10, 11, 12, 13, 14)
 DRESS = "deepfashion/fashionWOMENDressesid0000262902_3back.png"

@@ -14,6 +14,9 @@ import pytest
 from PIL import Image
 from safetensors.torch import load_file
 
+from motion_transfer.errors import InputError
+from motion_transfer.estimate.models import MODEL_FILES, find_model
+from motion_transfer.extras import require_extra
 from motion_transfer.weights.checkpoint import inspect_checkpoint
 
 pytest.importorskip("accelerate", reason="needs the `train` extra")
@@ -170,7 +173,7 @@ def test_what_cannot_be_used(
 
 
 def test_without_the_extra(studio, mt, photos: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motion_transfer.training.extra.find_spec", lambda _name: None)
+    monkeypatch.setattr("motion_transfer.extras.find_spec", lambda _name: None)
     result = mt("train", "--data", photos, "-o", studio.folder / "run", *QUICK)
     assert result.code == 2
     assert "pip install 'motion-transfer[train]'" in result.err
@@ -202,3 +205,47 @@ def test_synthetic_people(studio, mt, body_model) -> None:
     assert result.code == 0, result.err
     notes = inspect_checkpoint(stream / "weights.safetensors").notes
     assert notes["data"] == "ever new synthetic people"
+
+
+@pytest.fixture
+def blazepose() -> None:
+    """BlazePose's files are fetched once a machine."""
+    try:
+        require_extra("estimate")
+        for file in MODEL_FILES:
+            find_model(file)
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+def test_the_network_that_paints_iuv(studio, mt, body_model, blazepose) -> None:
+    data, run = studio.folder / "samples", studio.folder / "iuv"
+    make = ("train", "iuv", "make", data, "--people", 2, "--workers", 1)
+    assert mt(*make).out == f"{data}: 2 of 2 people added\n"
+    assert mt(*make).out == f"{data}: 0 of 2 people added\n"
+    fit = ("train", "iuv", "fit", data, run, "--batch-size", 2)
+    fitted = mt(*fit, "--steps", 2)
+    assert fitted.out == f"{run}/weights.safetensors: 2 steps\n", fitted.err
+    assert fitted.err.startswith("step 2/2: parts ")
+    longer = mt(*fit, "--steps", 3, "-q")
+    assert (longer.out, longer.err) == (f"{run}/weights.safetensors: 3 steps\n", "")
+    scored = mt("train", "iuv", "score", data, run / "weights.safetensors")
+    assert [line.split()[0] for line in scored.out.splitlines()] == [
+        *("iou", "part_agreement", "uv_error", "swapped", "turned"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--steps", 3, "iuv", "make", "data", "--people", 1), "mean nothing to `mt train iuv`"),
+        (("iuv", "make", "data"), "Missing option '--people'"),
+        (("iuv", "fit", "nowhere", "run"), "make some by `mt train iuv make`"),
+        (("iuv", "score", "nowhere", "w"), "nowhere holds no samples"),
+    ],
+)
+def test_what_cannot_be_used_for_iuv(mt, arguments: tuple[str, ...], message: str) -> None:
+    result = mt("train", *arguments)
+    assert result.code == 2
+    assert message in result.err
+    assert "Traceback" not in result.err

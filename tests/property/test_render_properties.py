@@ -14,9 +14,12 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from motion_transfer import render_video
-from motion_transfer.media.iuv_stream import natural_key, open_reader, open_stream
-from motion_transfer.render.options import parse_frames, parse_parts, parse_rate
-from motion_transfer.render.person import People, Person, follow
+from motion_transfer.drawing.person import Box, People, Person, find_again
+from motion_transfer.drawing.window import Window, plan_window
+from motion_transfer.media.folders import natural_key
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.option import parse_frames, parse_rate
+from motion_transfer.render.options import parse_parts
 from motion_transfer.render.plan import (
     CHUNK_FRAMES,
     Chunk,
@@ -25,7 +28,6 @@ from motion_transfer.render.plan import (
     Shot,
     frame_range,
 )
-from motion_transfer.render.window import Window, plan_window
 from nhrr_core import PART_GROUPS, PART_NAMES
 
 FRAMES = 2 * CHUNK_FRAMES + 5
@@ -112,7 +114,7 @@ def test_cutting_invents_no_pixel(x: int, y: int, side: int, size: int, seed: in
 
 
 boxes = st.builds(
-    lambda x, y, w, h: Person(x, y, x + w, y + h, w * h, (1,)),
+    lambda x, y, w, h: Person(Box(x, y, x + w, y + h), w * h, (1,)),
     *(st.integers(0, 300), st.integers(0, 300), st.integers(1, 200), st.integers(1, 200)),
 )
 
@@ -120,22 +122,23 @@ boxes = st.builds(
 @few
 @given(path=st.lists(st.none() | boxes, min_size=1).filter(any))
 def test_the_window_holds_everybody(path: list[Person | None]) -> None:
-    window = plan_window(path)
+    window = plan_window([person and person.box for person in path])
     assert window.side % 2 == 0
     assert window.side >= 16
     for person in filter(None, path):
-        assert window.x <= person.x0 <= person.x1 <= window.x + window.side
-        assert window.y <= person.y0 <= person.y1 <= window.y + window.side
+        assert window.x <= person.box.left <= person.box.right <= window.x + window.side
+        assert window.y <= person.box.top <= person.box.bottom <= window.y + window.side
 
 
 @few
 @given(frames=st.lists(st.lists(boxes, max_size=4), min_size=1), first=boxes)
 def test_following_only_ever_finds_people_who_are_there(frames, first: Person) -> None:
     crowd = [People(tuple(people), len(people)) for people in frames]
-    path = follow([People((first,), 1), *crowd], first)
-    assert path[0] == first
-    for person, people in zip(path[1:], crowd, strict=True):
+    last = first
+    for people in crowd:
+        person = find_again(people.persons, last)
         assert person is None or person in people.persons
+        last = person or last
 
 
 @few

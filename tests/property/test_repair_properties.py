@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_transfer.repair.gaps import blend, fill_gaps
+from motion_transfer.repair.run import remove_speckles
 from motion_transfer.repair.smoothing import BORDER_PX, smooth
-from motion_transfer.repair.speckles import remove_speckles
 
 SIDE = 40
 

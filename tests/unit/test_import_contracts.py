@@ -42,18 +42,28 @@ def test_the_contracts_hold(copy: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("motion_transfer/media/image.py", "import motion_transfer.render.options"),
+        ("motion_transfer/media/work.py", "import motion_transfer.render.options"),
         ("motion_transfer/weights/checkpoint.py", "import motion_transfer.cli.main"),
         ("motion_transfer/render/run.py", "import motion_transfer.api"),
-        ("motion_transfer/render/sheet.py", "import motion_transfer.training.metrics"),
-        ("motion_transfer/training/pairs.py", "import motion_transfer.evaluation.protocol"),
-        ("motion_transfer/evaluation/sheet.py", "import PIL.Image"),
-        ("motion_transfer/errors.py", "import motion_transfer.media.image"),
+        ("motion_transfer/render/engine.py", "import motion_transfer.training.metrics"),
+        ("motion_transfer/drawing/canvas.py", "import motion_transfer.render.options"),
+        ("motion_transfer/drawing/source.py", "import motion_transfer.estimate.opening"),
+        ("motion_transfer/drawing/window.py", "import motion_transfer.people"),
+        ("motion_transfer/estimate/clip.py", "import motion_transfer.people"),
+        ("motion_transfer/estimate/clip.py", "import motion_transfer.training.iuv.samples"),
+        ("motion_transfer/render/driver.py", "import motion_transfer.people.figure.body"),
+        ("motion_transfer/training/iuv/samples.py", "import motion_transfer.people.dataset"),
+        ("motion_transfer/people/figure/body.py", "import motion_transfer.people.person"),
+        ("motion_transfer/training/pairs.py", "import motion_transfer.evaluation.report"),
+        ("motion_transfer/evaluation/report.py", "import PIL.Image"),
+        ("motion_transfer/errors.py", "import motion_transfer.media.work"),
+        ("motion_transfer/option.py", "import motion_transfer.media.work"),
         ("motion_transfer/training/step.py", "import accelerate"),
         ("motion_transfer/batch/schedule.py", "import ray"),
         ("motion_transfer/render/content.py", "import motion_transfer.batch.run"),
         ("motion_transfer/cli/run.py", "import av"),
-        ("motion_transfer/render/sheet.py", "import PIL.Image"),
+        ("motion_transfer/preview/views.py", "import imageio.v3"),
+        ("motion_transfer/media/iuv/stream.py", "import motion_transfer.media.iuv.dump"),
         ("nhrr_core/texture.py", "import numpy"),
         ("nhrr_core/config.py", "import motion_transfer.errors"),
     ],
@@ -63,4 +73,4 @@ def test_a_forbidden_import_is_noticed(copy: Path, module: str, line: str) -> No
         file.write(f"\n{line}\n")
     result = lint(copy)
     assert result.returncode == 1, result.stdout
-    assert "1 broken" in result.stdout or "2 broken" in result.stdout
+    assert any(f" {count} broken" in result.stdout for count in (1, 2, 3))

@@ -18,13 +18,21 @@ from motion_transfer.people.clothes.fit import Fitting
 from motion_transfer.people.clothes.surface import BodySurface
 from motion_transfer.people.clothes.wardrobe import Skirt
 from motion_transfer.people.figure.body import Faces, Points, SkinWeights
-from motion_transfer.people.figure.mesh import PosedBody
+from motion_transfer.people.figure.mesh import PosedBody, Settle
 
 COLUMNS = 48
 ROWS = 26
+EVERYWHERE = 9.0  # metres; above everybody's head
 _CLEARANCE = 0.012  # metres between legs and cloth
 _RINGS = (0, 3, 6, 9, 12, 15)  # rows of a leg's table that bound the cones standing for the leg
+_HELD_ROWS = 4  # the uppermost, which no leg can push outwards
 Grid = Float32[np.ndarray, "rows columns"]
+
+_TURN = np.arange(COLUMNS) * 2 * np.pi / COLUMNS
+_COSINE = np.cos(_TURN[:, None] - _TURN)
+_LIMIT = 0.17  # of 80 degrees: beyond it a column says nothing about another one
+_SECANTS = np.where(_COSINE > _LIMIT, 1 / np.maximum(_COSINE, _LIMIT), 1e3).astype(np.float32)
+"""1 / cos of the angle between columns."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +41,10 @@ class SkirtShape:
 
     Attributes:
         points: ROWS * COLUMNS x 3, row by row from the top.
-        outward: unit vectors away from the axis, the same order.
-        weights: how the bones move them.
+        outward: Unit vectors away from the axis, in the same order.
+        weights: How the bones move the points.
         down: ROWS, metres along the cloth from the upper edge.
-        around: mean circumference, metres.
+        around: The mean circumference, metres.
     """
 
     points: Points
@@ -47,51 +55,44 @@ class SkirtShape:
 
 
 @cache
-def grid_faces(rows: int, columns: int) -> Faces:
-    """Triangles of a tube seen from outside; column 0 closes on the last one."""
+def tube_grid(rows: int, columns: int) -> tuple[Faces, Float32[np.ndarray, "F 3 2"]]:
+    """Make the triangles of a tube seen from outside, and their corners' texture coordinates.
+
+    Column 0 closes on the last one; u runs once around, v from top to bottom.
+    """
     r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
     a, b = r * columns + c, r * columns + (c + 1) % columns
     below_a, below_b = a + columns, b + columns
     upper, lower = np.stack([a, below_b, b], -1), np.stack([a, below_a, below_b], -1)
-    return np.stack([upper, lower], 2).reshape(-1, 3).astype(np.int32)
-
-
-@cache
-def grid_uv(rows: int, columns: int) -> np.ndarray:
-    """Texture coordinates of `grid_faces`: u once around, v from top to bottom; F x 3 x 2."""
-    r, c = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    faces = np.stack([upper, lower], 2).reshape(-1, 3).astype(np.int32)
     u0, u1 = c / columns, (c + 1) / columns
     v0, v1 = r / (rows - 1), (r + 1) / (rows - 1)
-
-    def corner(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return np.stack([u, v], -1)
-
-    upper = np.stack([corner(u0, v0), corner(u1, v1), corner(u1, v0)], 2)
-    lower = np.stack([corner(u0, v0), corner(u0, v1), corner(u1, v1)], 2)
-    return np.stack([upper, lower], 2).reshape(-1, 3, 2).astype(np.float32)
+    corners = ((u0, v0), (u1, v1), (u1, v0), (u0, v0), (u0, v1), (u1, v1))
+    uv = np.stack([np.stack(corner, -1) for corner in corners], 2)
+    return faces, uv.reshape(-1, 3, 2).astype(np.float32)
 
 
 def shape_skirt(
-    skirt: Skirt, fitting: Fitting, ease: float = 0.0, flare_below: float = 9.0
+    skirt: Skirt, fitting: Fitting, ease: float = 0.0, flare_below: float = EVERYWHERE
 ) -> SkirtShape:
     """Cut a skirt to a body's measure.
 
     Args:
-        ease: of what is worn below it at the upper edge, metres.
-        flare_below: height on the template below which it may stand off, metres.
+        ease: Of what is worn below it at the upper edge, metres.
+        flare_below: Height on the template below which it may stand off, metres.
     """
-    body = fitting.body
-    scale = body.height / fitting.surface.model.template.height
-    axis = fitting.trunk[2]
-    hip = float(body.joint("upperleg01.L")[2]) - 0.07 * scale
-    top = float(body.joint("spine04")[2]) + skirt.top * scale
-    ankle = float(body.joint("foot.L")[2])
-    hip_joint = float(body.joint("upperleg01.L")[2])
+    body, scale, axis = fitting.body, fitting.scale, fitting.trunk[1]
+    bones = ("upperleg01.L", "spine04", "foot.L")
+    hip_joint, waist, ankle = (float(body.joint(bone)[2]) for bone in bones)
+    hip, top = hip_joint - 0.07 * scale, waist + skirt.top * scale  # hips are widest 7 cm lower
     hem = hip_joint - skirt.length * (hip_joint - ankle)
     angles = np.arange(COLUMNS, dtype=np.float32) * np.float32(2 * np.pi / COLUMNS)
     z = np.linspace(top, hem, ROWS, dtype=np.float32)
-    reach = np.maximum(_trunk_reach(fitting, z, angles), _legs_reach(fitting, z, angles))
-    snug = _hull_radii(reach) + np.float32(skirt.ease + ease)
+    surface = fitting.surface
+    tubes = surface.torso_tube, surface.limb_tubes["leg.L"], surface.limb_tubes["leg.R"]
+    reach = np.max([_reach(tube.gather(body.points), z, angles, axis) for tube in tubes], 0)
+    # cloth spans hollows, as between the legs: the convex outline that reaches so far
+    snug = (reach[:, None, :] * _SECANTS).min(2) + np.float32(skirt.ease + ease)
     near_top = ramp(top - z, 0.0, 0.08)[:, None]  # snug at the waistband
     snug = snug - np.float32(skirt.ease * 0.3) * (1 - near_top)
     radius = _flared(skirt, snug, z, hip, angles, flare_below * scale)
@@ -110,7 +111,12 @@ def shape_skirt(
 
 
 def _reach(cells: np.ndarray, z: np.ndarray, angles: np.ndarray, axis: float) -> Grid:
-    """How far a tube's rings reach from the skirt's axis in each direction, 0 off its ends."""
+    """Measure how far a tube's rings reach from the skirt's axis; 0 off its ends.
+
+    Args:
+        cells: Of a trunk's or leg's table, levels x angles x 3.
+        z, angles: The skirt's rows and columns.
+    """
     across = cells[..., :1] * np.sin(angles) - (cells[..., 1:2] - axis) * np.cos(angles)
     across = across.max(1)
     heights = cells[..., 2].mean(1)
@@ -119,49 +125,25 @@ def _reach(cells: np.ndarray, z: np.ndarray, angles: np.ndarray, axis: float) ->
     share = (at - low)[:, None]
     out = across[low] * (1 - share) + across[low + 1] * share
     beyond = (z > heights[0] + 0.02) | (z < heights[-1] - 0.05)
-    return np.where(beyond[:, None], 0, out).astype(np.float32)
-
-
-def _trunk_reach(fitting: Fitting, z: np.ndarray, angles: np.ndarray) -> Grid:
-    cells = fitting.surface.torso_tube.gather(fitting.body.points)
-    return _reach(cells, z, angles, fitting.trunk[2])
-
-
-def _legs_reach(fitting: Fitting, z: np.ndarray, angles: np.ndarray) -> Grid:
-    out = np.zeros((len(z), len(angles)), np.float32)
-    for name in ("leg.L", "leg.R"):
-        cells = fitting.surface.limb_tubes[name].gather(fitting.body.points)
-        out = np.maximum(out, _reach(cells, z, angles, fitting.trunk[2]))
-    return out
-
-
-@cache
-def _secants() -> np.ndarray:
-    """1 / cos of the angle between columns; large where they are more than 80 degrees apart."""
-    turn = np.arange(COLUMNS) * 2 * np.pi / COLUMNS
-    cosine = np.cos(turn[:, None] - turn)
-    return np.where(cosine > 0.17, 1 / np.maximum(cosine, 0.17), 1e3).astype(np.float32)
-
-
-def _hull_radii(reach: Grid) -> Grid:
-    """Radii of the convex outlines that reach so far in each direction."""
-    return (reach[:, None, :] * _secants()).min(2)
+    return np.where(beyond[:, None], 0, np.maximum(out, 0)).astype(np.float32)
 
 
 def _flared(
     skirt: Skirt, snug: Grid, z: np.ndarray, hip: float, angles: np.ndarray, highest: float
 ) -> Grid:
-    """Radii: snug down to the hips, then falling outwards, with waves towards the hem."""
+    """Widen snug radii: below the hips they fall outwards, with waves towards the hem."""
     below = np.maximum(min(hip, highest) - z, 0)
     start = min(float(z[0]), highest)
     radius = snug
     at_hip = int(np.argmin(np.abs(z - hip)))
     if z[-1] < hip:
         oval = radius[at_hip]
+        # bodies are oval; cloth that hangs free grows rounder, to 70 % within 60 cm
         rounder = oval + (oval.mean() - oval) * np.minimum(below * 1.2, 0.7)[:, None]
         flare = rounder + np.float32(skirt.flare) * below[:, None]
         radius = np.where(below[:, None] > 0, np.maximum(radius, flare), radius)
     if skirt.kind in ("circle", "a_line", "maxi", "tiered") and skirt.flare > 0.15:
+        # wide skirts stand off from the waist on, less than below the hips
         early = radius[0] + np.float32(0.6 * skirt.flare) * (start - z)[:, None]
         radius = np.where((z < start)[:, None], np.maximum(radius, early), radius)
     if skirt.waves:
@@ -174,25 +156,21 @@ def _flared(
 
 
 def _weights(fitting: Fitting, z: np.ndarray, x: Grid, radius: Grid, hip: float) -> SkinWeights:
-    """Rigid with the pelvis above the hips, then shared by the thighs, then by the shins."""
-    body = fitting.body
-    names = body.skeleton.index
-    knee = float(body.joint("lowerleg01.L")[2])
-    waist = float(body.joint("spine04")[2])
+    """Share the rows out: the pelvis's above the hips, then the thighs', then the shins'."""
+    names = fitting.body.skeleton.index
+    knee, waist = (float(fitting.body.joint(bone)[2]) for bone in ("lowerleg01.L", "spine04"))
+    # never wholly the legs': cloth lags behind a stride
     thighs = 0.88 * ramp(z, hip + 0.13, hip - 0.12)
     shins = 0.85 * ramp(z, knee + 0.03, knee - 0.2)
     above = ramp(z, waist - 0.02, waist + 0.12)  # of a dress's waist: the spine's
     side = ramp(x / radius.max(1, keepdims=True), -0.75, 0.75)
-    count = ROWS * COLUMNS
-    matrix = np.zeros((count, len(names)), np.float32)
-    pelvis = ((1 - thighs) * (1 - above))[:, None] * np.ones_like(x)
-    matrix[:, names["root"]] = pelvis.ravel()
-    matrix[:, names["spine04"]] = (((1 - thighs) * above)[:, None] * np.ones_like(x)).ravel()
+    matrix = np.zeros((ROWS, COLUMNS, len(names)), np.float32)
+    matrix[..., names["root"]] = ((1 - thighs) * (1 - above))[:, None]
+    matrix[..., names["spine04"]] = ((1 - thighs) * above)[:, None]
     for name, share in (("L", side), ("R", 1 - side)):
-        thigh = (thighs * (1 - shins))[:, None] * share
-        matrix[:, names[f"upperleg01.{name}"]] = thigh.ravel()
-        matrix[:, names[f"lowerleg01.{name}"]] = ((thighs * shins)[:, None] * share).ravel()
-    return SkinWeights(csr_array(matrix))
+        matrix[..., names[f"upperleg01.{name}"]] = (thighs * (1 - shins))[:, None] * share
+        matrix[..., names[f"lowerleg01.{name}"]] = (thighs * shins)[:, None] * share
+    return SkinWeights(csr_array(matrix.reshape(ROWS * COLUMNS, -1)))
 
 
 @dataclass(frozen=True)
@@ -200,8 +178,8 @@ class Cones:
     """Legs as cones.
 
     Attributes:
-        start, end: N x 3, the axes.
-        radius: N x 2 at start and end, metres.
+        start, end: Of the axes, N x 3.
+        radius: At start and end, N x 2, metres.
     """
 
     start: np.ndarray
@@ -210,13 +188,13 @@ class Cones:
 
 
 def leg_cones(surface: BodySurface, points: Points, clearance: float = 0.0) -> Cones:
-    """The legs of a posed skin as chains of cones that enclose them."""
+    """Enclose the legs of a posed skin in chains of cones."""
     starts, ends, radii = [], [], []
     for name in ("leg.L", "leg.R"):
         rings = surface.limb_tubes[name].gather(points)[list(_RINGS)]
         centre = rings.mean(1)
         away = np.sort(np.linalg.norm(rings - centre[:, None], axis=2), axis=1)
-        radius = away[:, -2] + clearance  # thighs are not round
+        radius = away[:, -2] + clearance  # the largest but one: thighs are not round
         starts.append(centre[:-1])
         ends.append(centre[1:])
         radii.append(np.stack([radius[:-1], radius[1:]], 1))
@@ -224,9 +202,9 @@ def leg_cones(surface: BodySurface, points: Points, clearance: float = 0.0) -> C
 
 
 def exit_distance(points: Points, outward: Points, cones: Cones) -> np.ndarray:
-    """How far each point has to go along its outward direction until all cones lie behind it.
+    """Measure how far points have to go outwards until all cones lie behind them.
 
-    Returns: N; negative where they do already, -1 where the line meets none.
+    Returns: N, metres; negative where they do already, -1 where the line meets none.
     """
     ray = np.full(len(points), -1, np.float32)
     for start, end, radii in zip(cones.start, cones.end, cones.radius, strict=True):
@@ -241,26 +219,29 @@ def exit_distance(points: Points, outward: Points, cones: Cones) -> np.ndarray:
         md, mm = np.einsum("ni,ni->n", m, d), np.einsum("ni,ni->n", m, m)
         at = np.clip(along_p / long, 0, 1)
         root, inside = -md, mm
-        for _ in range(2):
+        for _ in range(2):  # as for a cylinder, with the cone's radius at the last place found
             radius = radii[0] + (radii[1] - radii[0]) * at
             inside = md * md - dd * (mm - radius * radius)
             root = (np.sqrt(np.maximum(inside, 0)) - md) / dd
             at = np.clip((along_p + root * along_d) / long, 0, 1)
         place = (along_p + root * along_d) / long
+        # a little beyond the ends, so that no gap opens between cones; not along the axis
         hit = (inside > 0) & (place > -0.05) & (place < 1.05) & (dd > 0.05)
         ray = np.maximum(ray, np.where(hit, root, -1))
     return ray
 
 
-def settler(shape: SkirtShape, surface: BodySurface, rows_from: int = 4):
-    """What leaves a skirt outside the legs, taut between them: a `Settle`."""
-    first = rows_from * COLUMNS
+def settler(shape: SkirtShape, surface: BodySurface) -> Settle:
+    """Make what leaves a skirt outside the legs, taut between them."""
+    first = _HELD_ROWS * COLUMNS
 
     def settle(points: Points, body: PosedBody) -> Points:
-        outward = _turned(shape, body)[first:]
+        turns = shape.weights.matrix @ body.transforms.reshape(-1, 12)
+        outward = np.einsum("vij,vj->vi", turns.reshape(-1, 3, 4)[..., :3], shape.outward)[first:]
+        outward = outward / (np.linalg.norm(outward, axis=1, keepdims=True) + 1e-9)
         cones = leg_cones(surface, body.points, _CLEARANCE)
         push = exit_distance(points[first:], outward, cones).reshape(-1, COLUMNS)
-        need = np.clip(push, 0, 0.6)
+        need = np.clip(push, 0, 0.6)  # metres; further out is no leg that pushes
         need = need - _sunk(push, np.maximum(outward[:, 2], 0).reshape(push.shape))
         lift = need
         for _ in range(5):  # cloth is drawn taut over what pushes it
@@ -273,28 +254,25 @@ def settler(shape: SkirtShape, surface: BodySurface, rows_from: int = 4):
 
 
 def _sunk(push: Grid, upward: Grid) -> Grid:
-    """How far cloth that faces upwards sinks onto the legs below it, metres."""
+    """Measure how far cloth that faces upwards sinks onto the legs below it, metres.
+
+    Args:
+        push: As `exit_distance` returns it.
+        upward: How much cloth faces upwards, 0..1: on thighs of somebody who sits.
+    """
     if upward.max() < 0.2:
         return np.zeros_like(push)
     weight = ramp(upward, 0.15, 0.6)
     known = ((push > -1) & (push < 0)) * weight
     slack = known * np.clip(-push, 0, 0.3)
-    for _ in range(9):
+    for _ in range(9):  # between the legs, where nothing is below, the cloth next to it decides
         slack, known = _spread(slack), _spread(known)
     sunk = weight * slack / np.maximum(known, 1e-4)
     return np.where(push > 0, 0, np.minimum(sunk, np.where(push > -1, -push, 0.3)))
 
 
 def _spread(values: Grid) -> Grid:
-    """The mean of each cell's four neighbours; half the value above the first row."""
+    """Take the mean of each cell's four neighbours; half the value above the first row."""
     padded = np.concatenate([values[:1] * 0.5, values, values[-1:]])
     around = np.roll(values, 1, 1) + np.roll(values, -1, 1)
     return (around + padded[:-2] + padded[2:]) / 4
-
-
-def _turned(shape: SkirtShape, body: PosedBody) -> Points:
-    """Outward directions after skinning."""
-    matrices = body.transforms.reshape(-1, 12)
-    turns = (shape.weights.matrix @ matrices).reshape(-1, 3, 4)[..., :3]
-    turned = np.einsum("vij,vj->vi", turns, shape.outward)
-    return turned / (np.linalg.norm(turned, axis=1, keepdims=True) + 1e-9)

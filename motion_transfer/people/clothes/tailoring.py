@@ -11,34 +11,24 @@ from functools import cache
 import cv2
 import numpy as np
 from jaxtyping import Float32
+from numpy.random import Generator
 
 from motion_transfer.people.clothes.cuts import Places
 from motion_transfer.people.clothes.fabrics import Colour
 
 _TILE = 640  # texels; larger than any panel's side
+_FURROW = 0.0008  # metres, of a seam
 
-
-def _linear_table() -> np.ndarray:
-    value = np.arange(256) / 255
-    table = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    return table.astype(np.float32)[None]
-
-
-_LINEAR = _linear_table()
-
-
-def linear(colours: Float32[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W 3"]:
-    """sRGB 0..1 to linear, through eight bits."""
-    return cv2.LUT(cv2.convertScaleAbs(colours, alpha=255), _LINEAR)
+_SRGB = np.arange(256) / 255
+_LINEAR = np.where(_SRGB <= 0.04045, _SRGB / 12.92, ((_SRGB + 0.055) / 1.055) ** 2.4)
+_LINEAR = _LINEAR.astype(np.float32)[None]
+"""What sRGB bytes stand for (IEC 61966-2-1): for OpenCV, a table is faster than powers."""
 
 
 @cache
-def crease_tiles() -> np.ndarray:
-    """Reliefs of creased cloth with ridges in several directions.
-
-    Returns: tiles x _TILE x _TILE, of deviation 1.
-    """
-    rng = np.random.default_rng(20)
+def _crease_tiles() -> Float32[np.ndarray, "tiles H W"]:
+    """Reliefs of creased cloth of deviation 1, with ridges in several directions."""
+    rng = np.random.default_rng(20)  # always the same tiles; a garment's seed chooses windows
     tiles = []
     for angle in (30, -35, 65, -60, 45, 85):
         side = _TILE // 2  # the noise is drawn at a quarter of the scale: it is slow
@@ -56,16 +46,14 @@ def crease_tiles() -> np.ndarray:
     return np.stack(tiles)
 
 
-def creases(
-    shape: tuple[int, int], rng: np.random.Generator, height: float
-) -> Float32[np.ndarray, "H W"]:
-    """A relief of creased cloth whose deviation is about `height` metres."""
-    tiles = crease_tiles()
-    parts = []
-    for _ in range(2):
+def creases(shape: tuple[int, int], rng: Generator, height: float) -> Float32[np.ndarray, "H W"]:
+    """Make a relief of creased cloth whose deviation is about `height` metres."""
+    tiles, parts = _crease_tiles(), []
+    for _ in range(2):  # two of them crossed: few outfits then have the same creases
         tile = tiles[rng.integers(len(tiles))]
         y, x = (int(rng.integers(_TILE - side + 1)) for side in shape)
         parts.append(tile[y : y + shape[0], x : x + shape[1]])
+    # 0.8 and 0.6 keep the deviation: their squares sum to 1
     return cv2.addWeighted(parts[0], 0.8 * height, parts[1], 0.6 * height, 0.0)
 
 
@@ -74,7 +62,7 @@ class Panel:
 
     Attributes:
         colours: H x W x 3 sRGB, changed in place.
-        shade: H x W, what the colours are multiplied by in the end; changed in place.
+        shade: H x W, by which the colours are multiplied in the end; changed in place.
         relief: H x W metres, changed in place.
     """
 
@@ -94,9 +82,8 @@ class Panel:
         height, width = self.colours.shape[:2]
         return height, width
 
-    def part(self, rows: slice, columns: slice) -> Panel:
-        """Part of the panel; changes to it are changes to the whole."""
-        at = rows, columns
+    def __getitem__(self, at: tuple[slice, slice]) -> Panel:
+        """Take part of the panel; changes to it are changes to the whole."""
         return Panel(self.colours[at], self.shade[at], self.relief[at])
 
     def tint(self, cover: np.ndarray, colour: Colour) -> None:
@@ -116,15 +103,13 @@ class Panel:
         self.relief[at] += np.float32(metres) * cover[at]
 
     def stitch(self, distance: np.ndarray, place: float, strength: float = 0.14) -> None:
-        """A seam where a distance takes a value: a dark line in a shallow furrow."""
+        """Sew a seam where a distance takes a value: a dark line in a shallow furrow."""
         cover = line(distance, place, 0.005)
-        at = _box(cover)
-        part = cover[at]
-        self.shade[at] *= 1 - np.float32(strength) * part
-        self.relief[at] -= np.float32(0.0008) * part
+        self.dim(cover, strength)
+        self.raise_by(cover, -_FURROW)
 
     def ribs(self, cover: np.ndarray, deep: float = 0.14) -> None:
-        """Ribbed knit along the columns where `cover` is 1."""
+        """Knit ribs along the columns where `cover` is 1."""
         ribs = (np.arange(cover.shape[1]) % 3 == 0).astype(np.float32)
         self.dim(cover * ribs, deep)
 
@@ -146,15 +131,16 @@ class Panel:
         part += ink[..., 3:] * (ink[..., :3] - part)
 
     def texture(self) -> Float32[np.ndarray, "H W 4"]:
-        """The finished texture."""
+        """Finish the texture: linear RGB and relief."""
         shaded = cv2.multiply(self.colours, cv2.merge([self.shade] * 3))
         out = np.empty((*self.relief.shape, 4), np.float32)
-        cv2.mixChannels([linear(shaded), self.relief], [out], [0, 0, 1, 1, 2, 2, 3, 3])
+        light = cv2.LUT(cv2.convertScaleAbs(shaded, alpha=255), _LINEAR)
+        cv2.mixChannels([light, self.relief], [out], [0, 0, 1, 1, 2, 2, 3, 3])
         return out
 
 
 def _box(cover: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns outside of which `cover` is 0."""
+    """Find the rows and columns outside of which `cover` is 0: details are small, panels large."""
     rows = np.flatnonzero(cover.max(1) > 0)
     if len(rows) == 0:
         return slice(0, 0), slice(0, 0)
@@ -163,28 +149,28 @@ def _box(cover: np.ndarray) -> tuple[slice, slice]:
 
 
 def band(distance: np.ndarray, start: float, end: float, soft: float = 0.003) -> np.ndarray:
-    """1 where start < distance < end, with edges `soft` metres wide; 0..1."""
+    """Cover where start < distance < end by 1, with edges `soft` metres wide; 0..1."""
     inside = np.minimum(distance - np.float32(start), np.float32(end) - distance)
     return np.clip(inside * np.float32(1 / soft) + 0.5, 0, 1)
 
 
 def line(distance: np.ndarray, place: float, width: float = 0.004) -> np.ndarray:
-    """A line where a distance takes a value; 0..1."""
+    """Cover a line where a distance takes a value; 0..1."""
     return band(distance, place - width / 2, place + width / 2)
 
 
 def front_of(at: Places) -> np.ndarray:
-    """1 on the front of the trunk, 0 on back and sleeves."""
+    """Cover the front of the trunk by 1, back and sleeves by 0."""
     return ((at.y < -0.03) & (at.on_arm < 0.5)).astype(np.float32)
 
 
 def disc(at: Places, x: float, z: float, radius: float) -> np.ndarray:
-    """1 inside a circle on the front, seen from the front."""
+    """Cover a circle on the front, seen from the front; 0..1."""
     away = np.sqrt((at.x - np.float32(x)) ** 2 + (at.z - np.float32(z)) ** 2)
     return band(away, -1, radius) * front_of(at)
 
 
 def box(at: Places, x: tuple[float, float], z: tuple[float, float]) -> np.ndarray:
-    """Distance inside a rectangle seen from the front or the back, metres."""
+    """Measure the distance inside a rectangle seen from the front or the back, metres."""
     across = np.minimum(at.x - np.float32(x[0]), np.float32(x[1]) - at.x)
     return np.minimum(across, np.minimum(at.z - np.float32(z[0]), np.float32(z[1]) - at.z))

@@ -4,7 +4,17 @@
 
 Convention: lengths are metres on a body of the template's size (1.84 m) and stand for the same
 places on every body; `sleeve` and `length` are shares of the arm (shoulder to wrist) or leg (hip
-to ankle). Everything is JSON-able through `dataclasses.asdict`.
+to ankle). Colours are sRGB 0..1. Everything is JSON-able through `dataclasses.asdict`. Of all
+garments these say the same:
+
+    kind      what it is called, and sometimes how it is decorated
+    ease      distance from what is below
+    drop      metres of radius by which cloth may follow the body for each metre; 0 hangs straight
+    gap       half the width of an open front, 0 closed
+    folds     0 smooth .. 1 crumpled
+    trim      colour of buttons, ribs, stripes, laces
+    gloss     0 cloth .. 1 patent leather
+    seed      of folds and other details
 """
 
 from __future__ import annotations
@@ -17,7 +27,7 @@ from motion_transfer.people.clothes.prints import Print
 
 @dataclass(frozen=True)
 class Belt:
-    """Attributes: colour: sRGB 0..1; width: metres; buckle: sRGB colour of its buckle."""
+    """A belt; `buckle` is the colour of its buckle."""
 
     colour: Colour
     width: float
@@ -30,28 +40,18 @@ class Top:
 
     Attributes:
         kind: t_shirt, tank, long_sleeve, shirt, blouse, hoodie, sweater, crop_top, polo,
-            turtleneck, jacket, blazer, coat, cardigan, bodice.
-        fabric: of it.
-        hem: height above the crotch of its lower edge; below about 0 a skirt of its own goes on.
-        sleeve: share of the arm; 0 is sleeveless.
-        armhole: how far in from the shoulder's edge a sleeveless armhole is cut, metres.
+            turtleneck, jacket, blazer, coat, cardigan or bodice (of a dress).
+        hem: Height above the crotch of its lower edge; below about 0 a skirt of its own goes on.
+        sleeve: Share of the arm; 0 is sleeveless.
+        armhole: How far in from the shoulder's edge a sleeveless armhole is cut.
         neck: crew, v, scoop, boat, square, off_shoulder, straps or turtle.
-        neck_depth, neck_width: metres below the neck's base in front, and half its width.
-        ease: distance from what is below, metres.
-        drop: 0 hangs straight down from the chest; about 1 follows the body.
-        sleeve_radii: least radii along the sleeve, metres.
-        opening: closed, buttons, zip or open (in front).
-        gap: half the width of an open front, metres.
+        neck_depth, neck_width: From the neck's base down in front, and half its width.
+        sleeve_radii: Least radii along the sleeve.
+        opening: closed, buttons or open (in front).
         collar: none, shirt, polo, lapels, hood or band.
         cuffs: plain, ribbed or buttoned.
-        folds: 0 smooth .. 1 crumpled.
-        trim: colour of buttons, ribs, stripes; sRGB.
-        print: a motif, or None.
-        print_width: metres; 0 without a print.
-        print_on_back: its place.
+        print_width: Of the motif; 0 without one.
         pocket: none, chest, kangaroo or patch.
-        gloss: 0 cloth .. 1 patent leather.
-        seed: of folds and other details.
     """
 
     kind: str
@@ -84,14 +84,13 @@ class Trousers:
     """A garment with two legs.
 
     Attributes:
-        kind: jeans, chinos, suit, leggings, joggers, shorts.
-        length: share of the leg.
-        rise: height of the waistband above the waist (often below: negative), metres.
-        ease: at hips and thighs, metres.
-        radii: least radii from thigh to hem, metres.
-        drop: as for tops, in metres of radius a metre.
+        kind: jeans, chinos, suit, leggings, joggers or shorts.
+        length: Share of the leg.
+        rise: Height of the waistband above the waist (often below: negative).
+        ease: At hips and thighs.
+        radii: Least radii from thigh to hem.
         cuffs: plain, ribbed or turned_up.
-        stripe: a stripe down the outer seams.
+        stripe: One down the outer seams.
     """
 
     kind: str
@@ -116,15 +115,13 @@ class Skirt:
 
     Attributes:
         kind: mini, pencil, a_line, circle, pleated, maxi, tiered or tails (of a coat or tunic).
-        top: height of its upper edge above the waist, metres.
-        length: share of the leg where it ends; below 0 the hip joint's height is the edge.
-        flare: by how much the radius grows for each metre below the hips.
-        waves: number of waves around the hem; 0 none.
-        wave_height: of the waves at the hem, metres.
-        pleats: sharp pleats instead of round waves.
-        ease: from hips and legs, metres.
-        gap: half the width of an open front, metres; 0 closed.
-        waistband: height of a waistband, metres; 0 none.
+        length: Share of the leg where it ends.
+        top: Height of its upper edge above the waist.
+        flare: By how much the radius grows for each metre below the hips.
+        waves: Their number around the hem; 0 none.
+        wave_height: At the hem.
+        pleats: Sharp pleats instead of round waves.
+        waistband: Its height; 0 none.
     """
 
     kind: str
@@ -151,10 +148,9 @@ class Shoes:
 
     Attributes:
         kind: sneakers, trainers, boots, flats, sandals, loafers or bare.
-        colour, sole, trim: sRGB; trim is of laces, stripes and straps.
-        shaft: height of a boot's shaft above the ankle joint, metres; 0 for low shoes.
-        socks: colour of socks, or None.
-        sock: height of the socks above the ankle joint, metres.
+        shaft: Height of a boot's shaft above the ankle joint; 0 for low shoes.
+        socks: Their colour.
+        sock: Height of the socks above the ankle joint.
     """
 
     kind: str
@@ -170,7 +166,7 @@ class Shoes:
 
 @dataclass(frozen=True)
 class Scarf:
-    """Attributes: fabric: of it; thickness: of its roll, metres; seed: of its folds."""
+    """A scarf wound around the neck; `thickness` is its roll's."""
 
     fabric: Fabric
     thickness: float
@@ -182,14 +178,10 @@ class Outfit:
     """Everything one person wears.
 
     Attributes:
-        shoes: on the feet.
-        top: next to the skin; with a `skirt` in the same fabric and no trousers it is a dress.
-        over: a jacket or the like over the top.
-        trousers: or None.
-        skirt: or None.
-        top_skirt, over_skirt: what hangs from a long top or coat below the hips.
-        tucked: the top is inside the waistband.
-        scarf: or None.
+        top: Next to the skin; a bodice and a `skirt` in the same fabric are a dress.
+        over: A jacket or the like over the top.
+        top_skirt, over_skirt: What hangs from a long top or coat below the hips.
+        tucked: The top is inside the waistband.
     """
 
     shoes: Shoes
@@ -201,8 +193,3 @@ class Outfit:
     over_skirt: Skirt | None = None
     tucked: bool = False
     scarf: Scarf | None = None
-
-    @property
-    def is_dress(self) -> bool:
-        """The skirt is sewn to the top."""
-        return self.top is not None and self.top.kind == "bodice"

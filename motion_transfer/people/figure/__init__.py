@@ -1,1 +1,1 @@
-"""The posed body: shape, skin in any pose, capsules, a camera, and its exact IUV."""
+"""The posed body: a shape, its skin in any pose, a camera, triangles drawn, and the exact IUV."""

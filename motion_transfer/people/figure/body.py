@@ -12,7 +12,9 @@ bone's head and followed by its parent's.
 from __future__ import annotations
 
 import fcntl
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -21,11 +23,11 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int32
 from scipy.sparse import csr_array
 
-from motion_transfer.people.extra import one_thread, require_people, start_warp
+from motion_transfer.extras import require_extra
 
 SHAPE_RANK = 120
-"""Directions in which bodies vary, of 310. Over 60 random adults no vertex is more than 2.2 mm away
-from where all of them put it, and a shape takes half the time."""
+"""Directions in which bodies vary, of 310. Measured over 60 random adults, no vertex is more than
+2.2 mm away from where all of them put it, and a shape takes half the time."""
 
 FIRST_USE = "preparing the body model, once on this machine, two to three minutes"
 
@@ -43,8 +45,8 @@ class Shape:
     Attributes:
         gender: 0 male, 1 female.
         age: 2/3 is a young adult, 1 is old; below 0.6 are adolescents and children.
-        height, weight, muscle, proportions, cupsize, firmness: from least to most.
-        african, asian, caucasian: shares of the face and body types of those names, as the model
+        height, weight, muscle, proportions, cupsize, firmness: From least to most.
+        african, asian, caucasian: Shares of the face and body types of those names, as the model
             calls them; only their ratio matters.
     """
 
@@ -66,13 +68,13 @@ class SkinWeights:
     """How much each bone moves each point.
 
     Attributes:
-        matrix: V x bones, sparse, each row sums to 1.
+        matrix: Sparse, V x bones; each row sums to 1.
     """
 
     matrix: csr_array
 
     def rows(self, index: np.ndarray) -> SkinWeights:
-        """The weights of some of the points."""
+        """Take the weights of some of the points."""
         return SkinWeights(self.matrix[index])
 
     def pose(self, points: Points, transforms: Transforms) -> Points:
@@ -88,8 +90,8 @@ class Skeleton:
     """Bones in an order in which parents come first.
 
     Attributes:
-        names: of the bones, as `anny` has them: `upperarm01.L`, `spine03`, ...
-        parents: index of each bone's parent, -1 for the root.
+        names: What `anny` calls the bones: `upperarm01.L`, `spine03`, ...
+        parents: The index of each bone's parent, -1 for the root.
     """
 
     names: tuple[str, ...]
@@ -97,6 +99,7 @@ class Skeleton:
 
     @cached_property
     def index(self) -> dict[str, int]:
+        """Each bone's number by its name."""
         return {name: i for i, name in enumerate(self.names)}
 
 
@@ -105,10 +108,8 @@ class Body:
     """One shape at rest.
 
     Attributes:
-        shape: the numbers it was made from.
-        skeleton: its bones.
-        points: the skin's vertices at rest, the lowest at z = 0.
-        heads: bones x 3, where each bone begins (the joint it turns about).
+        points: The skin's vertices at rest, the lowest at z = 0.
+        heads: Where each bone begins (the joint it turns about), bones x 3.
     """
 
     shape: Shape
@@ -117,22 +118,22 @@ class Body:
     heads: Float64[np.ndarray, "bones 3"]
 
     def joint(self, bone: str) -> Float64[np.ndarray, 3]:
-        """Where a bone begins at rest. Raises: KeyError for an unknown bone."""
+        """Tell where a bone begins at rest. Raises: KeyError for an unknown bone."""
         return self.heads[self.skeleton.index[bone]]
 
     @cached_property
     def height(self) -> float:
-        """From the soles to the crown, metres."""
+        """Metres from the soles to the crown."""
         return float(self.points[:, 2].max())
 
     def transforms(
         self, rotations: Rotations, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> Transforms:
-        """Where the bones take their surroundings: one 3 x 4 matrix a bone, rest -> posed.
+        """Work out where the bones take their surroundings: a 3 x 4 matrix each, rest -> posed.
 
         Args:
-            rotations: of the bones that turn.
-            offset: moves the whole body, metres.
+            rotations: The bones that turn.
+            offset: Moves the whole body, metres.
         Raises: KeyError for an unknown bone.
         """
         turned = {self.skeleton.index[name]: matrix for name, matrix in rotations.items()}
@@ -142,7 +143,7 @@ class Body:
         for bone, parent in enumerate(self.skeleton.parents):
             above = root if parent < 0 else out[parent]
             matrix = turned.get(bone)
-            if matrix is None:
+            if matrix is None:  # most bones do not turn: spare the products
                 out[bone] = above
                 continue
             head = self.heads[bone]
@@ -151,7 +152,7 @@ class Body:
         return out.astype(np.float32)
 
     def posed_joints(self, transforms: Transforms) -> Float64[np.ndarray, "bones 3"]:
-        """Where each bone begins once posed."""
+        """Tell where each bone begins once posed."""
         return np.einsum("bij,bj->bi", transforms[..., :3], self.heads) + transforms[..., 3]
 
 
@@ -159,14 +160,13 @@ class BodyModel:
     """What all shapes share, and the way to a shape.
 
     Attributes:
-        faces: triangles, counter-clockwise seen from outside.
-        weights: of the skin's vertices.
-        skeleton: bones.
-        template: the body in the middle of all ranges; places on the skin are named by it.
+        faces: Triangles, counter-clockwise seen from outside.
+        weights: How the bones move the skin's vertices.
+        template: The body in the middle of all ranges; places on the skin are named by it.
     """
 
     def __init__(self) -> None:
-        start_warp()
+        start_warp()  # anny imports it, and would let it print its banner
         from anny import Anny
 
         self._anny = Anny(
@@ -184,7 +184,7 @@ class BodyModel:
         self.template = self.body(Shape())
 
     def body(self, shape: Shape) -> Body:
-        """The rest pose of a shape."""
+        """Build the rest pose of a shape."""
         import torch
 
         numbers = {name: torch.tensor([value]) for name, value in asdict(shape).items()}
@@ -197,20 +197,20 @@ class BodyModel:
         return Body(shape, self.skeleton, points - floor, heads - floor)
 
     def pose(self, body: Body, transforms: Transforms) -> Points:
-        """The skin's vertices once posed."""
+        """Move the skin's vertices into a pose."""
         return self.weights.pose(body.points, transforms)
 
 
 @cache
 def load_body_model() -> BodyModel:
-    """The body model, loaded once a process.
+    """Load the body model, once a process.
 
     The very first time on a machine `anny` computes a cache (see `FIRST_USE`); processes that
     start meanwhile wait for the one that does.
 
     Raises: InputError with the command that installs the extra, where it is missing.
     """
-    require_people()
+    require_extra("people")
     folder = _cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".motion-transfer.lock").open("w") as lock:
@@ -219,8 +219,11 @@ def load_body_model() -> BodyModel:
 
 
 def is_cached() -> bool:
-    """Whether loading the body model will be quick: `anny` has left its cache on this machine."""
-    require_people()
+    """Tell whether the body model loads quickly: `anny` has left its cache on this machine.
+
+    Raises: InputError with the command that installs the extra, where it is missing.
+    """
+    require_extra("people")
     # three stages are saved one by one; the last one is there only when all are
     return any(_cache_folder().glob("v*/build_compact_model_data_*"))
 
@@ -229,3 +232,39 @@ def _cache_folder() -> Path:
     from anny.paths import get_anny_cache_path
 
     return Path(get_anny_cache_path())
+
+
+@cache
+def start_warp() -> None:
+    """Initialise `warp` without its banner, and without its remark that there is no GPU."""
+    import warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    # the remark comes from native code: only the file descriptor can be kept from it
+    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        warp.init()
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(nowhere)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keep OpenCV and torch to one thread: their sums depend on how work is shared among several.
+
+    What is computed here is small; several people are made in parallel by several processes.
+    """
+    import cv2
+    import torch
+
+    before = cv2.getNumThreads(), torch.get_num_threads()
+    cv2.setNumThreads(1)
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before[0])
+        torch.set_num_threads(before[1])

@@ -1,4 +1,7 @@
-"""DensePose's charts on the body's triangles.
+"""DensePose's charts on the body's triangles, and the exact IUV of a posed body drawn from them.
+
+The IUV is what DensePose would say if it made no mistakes: that of the bare body, as DensePose
+sees through clothes and hair.
 
 The file `body_charts.bin` is LZMA-compressed. Inside lie, for F triangles in the order of the body
 model's faces and without a header: F bytes, the part of each triangle; then F x 3 x 2 little-endian
@@ -14,10 +17,16 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
+import warp as wp
 from jaxtyping import Float32, UInt8
 
-WORD_MAX = 65535
-TRIANGLE_BYTES = 1 + 3 * 2 * 2
+from motion_transfer.people.figure.body import Faces, Points
+from motion_transfer.people.figure.camera import Camera
+from motion_transfer.people.figure.raster_kernels import draw_charts
+from motion_transfer.people.figure.rasterise import Triangles, rasterise, share_array
+
+_WORD_MAX = 65535
+_TRIANGLE_BYTES = 1 + 3 * 2 * 2  # its part, and two words for each corner
 
 
 @dataclass(frozen=True)
@@ -25,7 +34,7 @@ class BodyCharts:
     """Which chart each triangle of the body belongs to, and where on it.
 
     Attributes:
-        part: of each triangle, 1..24.
+        part: Of each triangle, 1..24.
         uv: (U, V) of its three corners, in [0, 1]. Corners that triangles of one part share have
             the same; at the border of two parts they differ.
     """
@@ -36,25 +45,51 @@ class BodyCharts:
 
 @cache
 def load_charts() -> BodyCharts:
-    """The table that ships with the package, read once per process; its arrays are read-only."""
-    return unpack_charts(
-        files("motion_transfer.people.figure").joinpath("body_charts.bin").read_bytes()
-    )
+    """Load the table that ships with the package, once a process; its arrays are read-only."""
+    folder = files("motion_transfer.people.figure")
+    return unpack_charts(folder.joinpath("body_charts.bin").read_bytes())
 
 
 def unpack_charts(packed: bytes) -> BodyCharts:
-    """The table inside a file's content.
+    """Read the table out of a file's content.
 
     Raises: lzma.LZMAError or ValueError where the content is no such file.
     """
     payload = lzma.decompress(packed)
-    count, rest = divmod(len(payload), TRIANGLE_BYTES)
+    count, rest = divmod(len(payload), _TRIANGLE_BYTES)
     if rest:
         raise ValueError(
-            f"a chart table holds {TRIANGLE_BYTES} bytes a triangle; {len(payload)} bytes are no "
+            f"a chart table holds {_TRIANGLE_BYTES} bytes a triangle; {len(payload)} bytes are no "
             f"multiple of it: build the file anew with tools/build_body_charts.py"
         )
     words = np.frombuffer(payload, "<u2", offset=count).reshape(count, 3, 2)
-    uv = words.astype(np.float32) / np.float32(WORD_MAX)
+    uv = words.astype(np.float32) / np.float32(_WORD_MAX)
     uv.setflags(write=False)
     return BodyCharts(np.frombuffer(payload, np.uint8, count), uv)
+
+
+def render_iuv(
+    points: Points, faces: Faces, charts: BodyCharts, camera: Camera
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Draw the charts of a bare body.
+
+    Args:
+        points: Of the posed skin.
+        charts: Of each of the faces.
+    Returns: (I, U, V) at pixel centres; 0 where nobody is.
+    """
+    screen = camera.project(points)
+    triangles = Triangles(faces)
+    nearest = rasterise(screen, triangles, camera.width, camera.height)
+    iuv = np.zeros((camera.height * camera.width, 3), np.uint8)
+    inputs = [
+        share_array(nearest, wp.uint64),
+        share_array(screen, wp.vec3),
+        triangles.arrays[0],
+        share_array(charts.part, wp.uint8),
+        share_array(charts.uv, wp.vec2),
+        camera.width,
+    ]
+    outputs = [share_array(iuv, wp.uint8)]
+    wp.launch(draw_charts, len(nearest), inputs=inputs, outputs=outputs, device="cpu")
+    return iuv.reshape(camera.height, camera.width, 3)

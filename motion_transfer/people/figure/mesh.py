@@ -22,11 +22,11 @@ class Material:
 
     Attributes:
         texture: H x W x 4: linear RGB, and relief in metres (bumps that only bend the light).
-        size_metres: width and height of the cloth that the texture shows; scales the relief.
-        gloss: strength of the highlight, 0 (cloth) .. 1 (patent leather).
-        sharpness: exponent of the highlight; about 8 satin and skin, 60 leather.
-        translucency: how far light wraps around, 0 (cloth) .. 1; skin about 0.3.
-        sheen_along_v: highlights stretch across v, as on strands of hair that run along v.
+        size_metres: Width and height of the cloth that the texture shows; scales the relief.
+        gloss: Strength of the highlight, 0 (cloth) .. 1 (patent leather).
+        sharpness: Exponent of the highlight; about 8 satin and skin, 60 leather.
+        translucency: How far light wraps around, 0 (cloth) .. 1; skin about 0.3.
+        sheen_along_v: Highlights stretch across v, as on strands of hair that run along v.
     """
 
     texture: Float32[np.ndarray, "H W 4"]
@@ -56,16 +56,16 @@ class Piece:
     """A surface that follows the bones.
 
     Attributes:
-        name: for descriptions, as `skin`, `top`, `skirt`, `hair`.
-        points: at rest, on the person's own body; metres.
-        faces: triangles of them.
-        weights: how the bones move the points.
+        name: For descriptions: `skin`, `top`, `skirt`, `hair`, ...
+        points: At rest, on the person's own body; metres.
+        faces: Triangles of them.
+        weights: How the bones move the points.
         corner_uv: F x 3 x 2 texture coordinates.
-        material: of the whole piece.
+        material: Of the whole piece.
         keep: V; the surface is there where its interpolation over a triangle is >= 0, so that hems
             and hairlines are smooth whatever the triangles are.
-        two_sided: both sides are seen (cloth, hair); closed surfaces leave this off.
-        settle: applied after skinning.
+        two_sided: Both sides are seen (cloth, hair); closed surfaces leave this off.
+        settle: Applied after skinning.
     """
 
     name: str
@@ -79,6 +79,6 @@ class Piece:
     settle: Settle | None = field(default=None, compare=False)
 
     def posed(self, body: PosedBody) -> Points:
-        """The points in a pose."""
+        """Bring the points into a pose."""
         points = self.weights.pose(self.points, body.transforms)
         return self.settle(points, body) if self.settle else points

@@ -1,8 +1,11 @@
-"""What `rasterise` runs for each triangle, compiled by `warp`; types are warp's, not Python's."""
+"""What `rasterise` runs for each triangle, and `render_iuv` for each pixel, compiled by `warp`.
+
+Types are warp's, not Python's.
+"""
 
 import warp as wp
 
-from motion_transfer.people.extra import start_warp
+from motion_transfer.people.figure.body import start_warp
 
 start_warp()
 
@@ -17,6 +20,7 @@ def fill(
     height: wp.int32,
     nearest: wp.array(dtype=wp.uint64),
 ):
+    """Enter a triangle at every pixel centre where it is the nearest so far."""
     f = wp.tid()
     corners = faces[f]
     a, b, c = screen[corners[0]], screen[corners[1]], screen[corners[2]]
@@ -58,7 +62,7 @@ def fill(
 
 @wp.func
 def perspective_weights(a: wp.vec3, b: wp.vec3, c: wp.vec3, px: float, py: float):
-    """Barycentric weights of a place on the picture, as on the triangle in space."""
+    """Turn a place on the picture into barycentric weights on the triangle in space."""
     area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
     wb = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / area
     wc = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / area
@@ -76,10 +80,10 @@ def draw_charts(
     width: wp.int32,
     iuv: wp.array2d(dtype=wp.uint8),
 ):
-    """Part and chart coordinates of what each pixel centre sees."""
+    """Write down the part and the chart coordinates of what each pixel centre sees."""
     i = wp.tid()
     face = int(wp.uint32(nearest[i] & wp.uint64(0xFFFFFFFF)))
-    if face < 0:
+    if face < 0:  # all ones: nothing is seen here
         return
     corners = faces[face]
     a, b, c = screen[corners[0]], screen[corners[1]], screen[corners[2]]

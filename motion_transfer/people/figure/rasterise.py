@@ -12,10 +12,11 @@ import numpy as np
 import warp as wp
 from jaxtyping import Float32, Int32, UInt8, UInt64
 
-from motion_transfer.people.figure.body import Faces
+from motion_transfer.people.figure.body import Faces, Points
 from motion_transfer.people.figure.raster_kernels import fill
 
 EMPTY = np.uint64(0xFFFFFFFFFFFFFFFF)
+"""A pixel that no triangle covers; larger than any depth, so that the nearest wins over it."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,8 @@ class Triangles:
     """What is drawn, but for where it lies.
 
     Attributes:
-        faces: triangles.
-        keep: of each vertex; fragments where its interpolation is < 0 are left out. None: all stay.
-        cull: of each triangle: 1 leaves it out when it is seen from behind. None: all of them.
+        keep: Of each vertex; fragments where its interpolation is < 0 are left out. None: all stay.
+        cull: Of each triangle: 1 leaves it out when it is seen from behind. None: all of them.
     """
 
     faces: Faces
@@ -34,12 +34,12 @@ class Triangles:
 
     @classmethod
     def two_sided(cls, faces: Faces, keep: Float32[np.ndarray, " V"] | None = None) -> Triangles:
-        """Seen from both sides."""
+        """Make triangles that are seen from both sides."""
         return cls(np.ascontiguousarray(faces), keep, np.zeros(len(faces), np.uint8))
 
     @cached_property
     def arrays(self) -> tuple[wp.array, wp.array, wp.array]:
-        """The same for kernels, shared with NumPy."""
+        """Faces, keep and cull for kernels, sharing NumPy's memory."""
         vertices = int(self.faces.max()) + 1 if len(self.faces) else 0
         keep = np.ones(vertices, np.float32) if self.keep is None else self.keep
         cull = np.ones(len(self.faces), np.uint8) if self.cull is None else self.cull
@@ -51,12 +51,12 @@ class Triangles:
 
 
 def rasterise(
-    screen: Float32[np.ndarray, "V 3"], triangles: Triangles, width: int, height: int
+    screen: Points, triangles: Triangles, width: int, height: int
 ) -> UInt64[np.ndarray, " H*W"]:
-    """Which triangle each pixel centre sees first.
+    """Find which triangle each pixel centre sees first.
 
     Args:
-        screen: vertices as pixel x, pixel y, depth (> 0 in front of the camera).
+        screen: Vertices: pixel x, pixel y, depth (> 0 in front of the camera).
     Returns: H * W values, row by row: the bits of the float32 depth above 32 bits of the triangle's
         number; all ones where nothing is seen. `triangle_ids` and `depths` take them apart.
     """
@@ -67,15 +67,15 @@ def rasterise(
 
 
 def share_array(array: np.ndarray, dtype: type) -> wp.array:
-    """A warp array over NumPy's own memory; the caller keeps that alive while kernels run."""
+    """Wrap NumPy's own memory for warp; the caller keeps it alive while kernels run."""
     return wp.array(np.ascontiguousarray(array), dtype=dtype, device="cpu", copy=False)
 
 
 def triangle_ids(nearest: UInt64[np.ndarray, " N"]) -> Int32[np.ndarray, " N"]:
-    """The triangle's number at each pixel, -1 where nothing is seen."""
+    """Take out the triangle's number at each pixel, -1 where nothing is seen."""
     return nearest.astype(np.uint32).view(np.int32)
 
 
 def depths(nearest: UInt64[np.ndarray, " N"]) -> Float32[np.ndarray, " N"]:
-    """Depth at each pixel, NaN where nothing is seen."""
+    """Take out the depth at each pixel, NaN where nothing is seen."""
     return (nearest >> np.uint64(32)).astype(np.uint32).view(np.float32)

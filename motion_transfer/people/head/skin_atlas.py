@@ -3,13 +3,15 @@
 The upper part of the texture shows the head, unrolled: columns go by the angle about a vertical
 axis through the head (the seam runs down the back, the face has the finest columns), rows by
 height. Below lies a strip for all other skin, whose rows are kinds of skin from pale palms to ruddy
-knees. Places are named in the template body's coordinates.
+knees.
+
+Convention: places are named in the template body's coordinates, metres.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -32,13 +34,13 @@ class SkinAtlas:
     """The texture's layout. The head has HEAD_ROWS rows and WIDTH columns.
 
     Attributes:
-        skin, eyes: triangles of the body that belong to the skin and to the eyeballs.
-        skin_uv, eye_uv: their corners' texture coordinates.
-        eye_points: vertices of both eyeballs, left first; `eyes` indexes into them.
-        angle: of each column, radians, 0 in front, positive towards the left hand.
-        z: of each row, metres.
+        skin, eyes: Triangles of the body that belong to the skin and to the eyeballs.
+        skin_uv, eye_uv: Their corners' texture coordinates.
+        eye_points: Vertices of both eyeballs, left first; `eyes` indexes into them.
+        angle: Each column's, radians, 0 in front, positive towards the left hand.
+        z: Each row's height, metres.
         place: HEAD_ROWS x WIDTH x 3: the outermost point of the template there.
-        opening: millimetres from the opening between the lids, 0 inside.
+        opening: Millimetres from the opening between the lids, 0 inside.
     """
 
     skin: Faces
@@ -52,39 +54,11 @@ class SkinAtlas:
     opening: Float32[np.ndarray, "rows columns"]
 
 
-_ATLASES: WeakKeyDictionary[BodyModel, SkinAtlas] = WeakKeyDictionary()
-
-
+@lru_cache(maxsize=1)
 def skin_atlas(model: BodyModel) -> SkinAtlas:
-    """The layout for a body model, made once."""
-    atlas = _ATLASES.get(model)
-    if atlas is None:
-        atlas = _ATLASES[model] = _lay_out(model)
-    return atlas
-
-
-def head_angle(points: Points) -> Float32[np.ndarray, " V"]:
-    """Angle about the head's axis, 0 in front, positive towards the left hand (template)."""
-    return np.arctan2(points[..., 0], AXIS_Y - points[..., 1])
-
-
-def column(angle: Float32[np.ndarray, " V"]) -> Float32[np.ndarray, " V"]:
-    """Texture u of an angle."""
-    turn = angle / np.pi
-    return 0.5 + 0.5 * turn * (1 + _FRONT * (1 - turn**2))
-
-
-def components(faces: Faces, count: int) -> np.ndarray:
-    """Which connected part each vertex belongs to, the largest part first."""
-    ends = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (count, count))
-    _, label = connected_components(links, directed=False)
-    order = np.argsort(-np.bincount(label), kind="stable")
-    return np.argsort(order)[label]
-
-
-def _lay_out(model: BodyModel) -> SkinAtlas:
+    """Lay out the texture for a body model; made once."""
     points, faces = model.template.points, model.faces
+    # the parts: 0 the skin, 1 the inside of the mouth, then the eyeballs
     part = components(faces, len(points))[faces[:, 0]]
     eye_faces = faces[part >= 2]
     eye_points = np.unique(eye_faces)
@@ -98,8 +72,8 @@ def _lay_out(model: BodyModel) -> SkinAtlas:
     head_uv = _head_uv(points[skin])
     uv = np.where(head[:, None, None], head_uv, _strip_uv(model)[skin])
     uv[inner] = (0.999, 0.999)  # the mouth's inside: the strip's last texel is kept dark
-    columns = np.linspace(-1, 1, 2001)
-    angle = np.interp((np.arange(WIDTH) + 0.5) / WIDTH, column(columns * np.pi), columns * np.pi)
+    turns = np.linspace(-1, 1, 2001) * np.pi  # `column` has no inverse: a table will do
+    angle = np.interp((np.arange(WIDTH) + 0.5) / WIDTH, column(turns), turns)
     rows = TOP - (np.arange(HEAD_ROWS) + 0.5) / HEAD_ROWS * (TOP - BOTTOM)
     place, seen_eye = _places(points, skin[head & ~inner], eye_faces)
     distance = cv2.distanceTransform((~seen_eye).astype(np.uint8), cv2.DIST_L2, 5)
@@ -116,6 +90,26 @@ def _lay_out(model: BodyModel) -> SkinAtlas:
     )
 
 
+def head_angle(points: Points) -> Float32[np.ndarray, " V"]:
+    """Measure angles about the head's axis, 0 in front, positive towards the left hand."""
+    return np.arctan2(points[..., 0], AXIS_Y - points[..., 1])
+
+
+def column(angle: Float32[np.ndarray, " V"]) -> Float32[np.ndarray, " V"]:
+    """Find the texture's u at an angle: the face gets more of it than the back of the head."""
+    turn = angle / np.pi
+    return 0.5 + 0.5 * turn * (1 + _FRONT * (1 - turn**2))
+
+
+def components(faces: Faces, count: int) -> np.ndarray:
+    """Number each vertex's connected part: 0 is the largest, the skin."""
+    ends = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (count, count))
+    _, label = connected_components(links, directed=False)
+    order = np.argsort(-np.bincount(label), kind="stable")
+    return np.argsort(order)[label]
+
+
 def _head_uv(corners: Float32[np.ndarray, "F 3 3"]) -> Float32[np.ndarray, "F 3 2"]:
     u = column(head_angle(corners))
     # triangles across the seam: move their left corners to the right of the texture's edge
@@ -128,6 +122,7 @@ def _head_uv(corners: Float32[np.ndarray, "F 3 3"]) -> Float32[np.ndarray, "F 3 
 
 def _strip_uv(model: BodyModel) -> Float32[np.ndarray, "V 2"]:
     points = model.template.points
+    # only noise varies along the strip: u need but change slowly in all directions
     u = 0.5 + (0.55 * points[:, 0] + 0.30 * points[:, 2] - 0.25 + 0.4 * points[:, 1]) / 1.6
     first, size = HEAD_ROWS + 2, STRIP_ROWS - 6
     v = (first + _kind(model) * size) / (HEAD_ROWS + STRIP_ROWS)
@@ -135,7 +130,10 @@ def _strip_uv(model: BodyModel) -> Float32[np.ndarray, "V 2"]:
 
 
 def _kind(model: BodyModel) -> Float32[np.ndarray, " V"]:
-    """From 0, palms and soles, through 0.5, most skin, to 1, knees and elbows."""
+    """Tell kinds of skin: from 0, palms and soles, through 0.5, most skin, to 1, knees and elbows.
+
+    Where each begins and how soft its border is was chosen by eye.
+    """
     points, body = model.template.points, model.template
     kind = np.full(len(points), 0.5)
     for side in ("L", "R"):
@@ -158,17 +156,22 @@ def _kind(model: BodyModel) -> Float32[np.ndarray, " V"]:
 
 
 def vertex_normals(points: Points, faces: Faces) -> Points:
-    """Unit normals, each the area-weighted mean over the triangles around a vertex."""
+    """Find unit normals, each the area-weighted mean over the triangles around a vertex."""
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
     across = np.cross(b - a, c - a)
     out = np.empty_like(points)
     for axis in range(3):
         out[:, axis] = np.bincount(faces.ravel(), across[:, axis].repeat(3), len(points))
-    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
+    return unit(out, 1e-12)
+
+
+def unit(vectors: np.ndarray, least: float = 1e-6) -> np.ndarray:
+    """Find the directions of vectors (along the last axis); 0 where they are shorter than least."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least)
 
 
 def _eye_uv(model: BodyModel, faces: Faces) -> Float32[np.ndarray, "E 3 2"]:
-    """Each eyeball as seen from in front; the left eye's tile is the first."""
+    """Show each eyeball as seen from in front; the left eye's tile is the first."""
     corners = model.template.points[faces]
     right = corners.mean(1)[:, 0] < 0
     joints = np.stack([model.template.joint("eye.L"), model.template.joint("eye.R")])
@@ -181,16 +184,16 @@ def _eye_uv(model: BodyModel, faces: Faces) -> Float32[np.ndarray, "E 3 2"]:
 def _places(
     points: Points, skin: Faces, eyes: Faces
 ) -> tuple[Float32[np.ndarray, "rows columns 3"], Bool[np.ndarray, "rows columns"]]:
-    """The outermost point of the head at every texel, and whether an eyeball is seen there."""
+    """Find the outermost point of the head at every texel, and whether an eyeball is seen there."""
     u, v = column(head_angle(points)), (TOP - points[:, 2]) / (TOP - BOTTOM)
     radius = np.hypot(points[:, 0], points[:, 1] - AXIS_Y)
     chart = np.stack([u * WIDTH, v * HEAD_ROWS, 2 - radius], 1).astype(np.float32)
     faces = np.concatenate([skin, eyes])
+    # triangles across the seam would cover the whole width
     wraps = np.ptp(u[faces], axis=1) > 0.5
     faces, is_eye = faces[~wraps], (np.arange(len(faces)) >= len(skin))[~wraps]
-    ids = triangle_ids(rasterise(chart, Triangles.two_sided(faces), WIDTH, HEAD_ROWS)).reshape(
-        HEAD_ROWS, WIDTH
-    )
+    seen = rasterise(chart, Triangles.two_sided(faces), WIDTH, HEAD_ROWS)
+    ids = triangle_ids(seen).reshape(HEAD_ROWS, WIDTH)
     place = points[faces[ids]].mean(2)
     # triangles are millimetres in the face: their middles, blurred, are near enough
     known = (ids >= 0).astype(np.float32)

@@ -2,14 +2,14 @@
 
 A capsule is a segment with a radius that changes evenly along it. The torso's lie from side to
 side, because a torso is wider than deep. Radii are measured from the skin at rest; the body is
-taken as symmetric.
+taken as symmetric. Lengths are metres.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from jaxtyping import Float64
@@ -18,20 +18,20 @@ from motion_transfer.people.figure.body import Body, BodyModel
 from motion_transfer.people.motion.limbs import MIRROR, NECK, SPINE, Matrix, Rest, rotation, turned
 from motion_transfer.people.motion.poses import (
     Arm,
+    Bend,
     Leg,
     Pose,
-    arm_chain,
+    arm_turns,
     collar_bone,
-    foot_chain,
-    hand_chain,
     leg_chain,
+    leg_turns,
 )
 
 Points = Float64[np.ndarray, "n 3"]
 Numbers = Float64[np.ndarray, "n"]
 
 TORSO = ("hips", "belly", "chest", "shoulders")
-TORSO_BONES = ("root", "spine04", "spine02", "spine01")
+TORSO_BONES = ("root", "spine04", "spine02", "spine01")  # which carry those
 LIMBS = ("upperarm", "forearm", "hand", "thigh", "shin", "foot")
 PARTS = (*TORSO, "head", *(f"{limb}.{side}" for side in "LR" for limb in LIMBS))
 INDEX = {part: i for i, part in enumerate(PARTS)}
@@ -39,7 +39,7 @@ MEASURED_STEP = 3
 """One in so many vertices is enough to take a limb's measure."""
 
 TOUCHING = 0.01
-"""How far parts may sink into each other, metres: skin gives way where a hand rests on it."""
+"""How far parts may sink into each other: skin gives way where a hand rests on it."""
 
 # bones whose skin belongs to a limb's capsule, by the start of their names
 _SKIN = {
@@ -53,25 +53,21 @@ _SKIN = {
 _SPAN = {"upperarm": 0.45, "thigh": 0.35}  # from where on they can come free of the torso
 
 
-def _tested() -> tuple[np.ndarray, np.ndarray]:
-    """Pairs that can meet: not neighbours, nor the torso's parts among themselves."""
-    limbs = {part: part.split(".")[0] for part in PARTS}
+def _can_meet(a: str, b: str) -> bool:
+    """Tell pairs that can meet: not neighbours, nor the trunk's parts among themselves."""
+    trunk = (*TORSO, "head")
+    limb_a, limb_b = a.split(".")[0], b.split(".")[0]
     near = {("upperarm", "forearm"), ("forearm", "hand"), ("thigh", "shin"), ("shin", "foot")}
     near |= {("thigh", "foot"), ("upperarm", "hand")}  # a limb's own joints limit those
-    first, second = [], []
-    for a, b in combinations(PARTS, 2):
-        both_trunk = a in (*TORSO, "head") and b in (*TORSO, "head")
-        same_side = a[-2:] == b[-2:]
-        neighbours = same_side and (limbs[a], limbs[b]) in near
-        thigh_and_trunk = a in (*TORSO, "head") and limbs[b] == "thigh"
-        shoulder = (a, limbs[b]) == ("shoulders", "upperarm")  # grows out of it
-        if not (both_trunk or neighbours or thigh_and_trunk or shoulder):
-            first.append(INDEX[a])
-            second.append(INDEX[b])
-    return np.array(first), np.array(second)
+    neighbours = a[-2:] == b[-2:] and (limb_a, limb_b) in near
+    grown_together = (a, limb_b) == ("shoulders", "upperarm") or (a in trunk and limb_b == "thigh")
+    return not ((a in trunk and b in trunk) or neighbours or grown_together)
 
 
-FIRST, SECOND = _tested()
+FIRST, SECOND = np.array(
+    [(INDEX[a], INDEX[b]) for a, b in combinations(PARTS, 2) if _can_meet(a, b)]
+).T
+"""The pairs that are tested, as places in `PARTS`."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +75,10 @@ class Placement:
     """Capsules of a posed body.
 
     Attributes:
-        starts, ends: of the segments, metres.
-        arms, legs: for left and right: shoulder, elbow, wrist / hip, knee, ankle in the world.
-        chest, upright: rotations of what arms and legs are measured against.
+        starts, ends: The segments' ends.
+        arms, legs: For left and right: shoulder, elbow, wrist, knuckles; hip, knee, ankle, heel,
+            toes.
+        chest, upright: Rotations of what arms and legs are measured against.
     """
 
     starts: Points
@@ -94,12 +91,12 @@ class Placement:
 
 @dataclass(frozen=True)
 class Contacts:
-    """The tested pairs: gap, where they are closest, and the unit vector from second to first.
+    """The tested pairs of parts.
 
     Attributes:
-        gaps: metres; negative where the two go through each other.
-        near, far: closest points on the first and the second part's segment.
-        normals: from the second to the first.
+        gaps: How far apart the two are; negative where they go through each other.
+        near, far: Closest points on the first and the second part's segment.
+        normals: Unit vectors from the second to the first.
     """
 
     gaps: Numbers
@@ -112,9 +109,9 @@ class Capsules:
     """One body's capsules.
 
     Attributes:
-        rest: its limbs' rest frames.
-        radii: 17 x 2, at start and end, metres.
-        allowed: gap from which a pair counts as tangled: -1 cm, or what the rest pose already has.
+        rest: Its limbs' rest frames.
+        radii: 17 x 2, at start and end.
+        allowed: Gap from which a pair counts as tangled: -1 cm, or what the rest pose already has.
     """
 
     def __init__(self, model: BodyModel, body: Body) -> None:
@@ -124,47 +121,53 @@ class Capsules:
         self._spine = np.array([at[name] for name in SPINE])
         self._neck = np.array([at[name] for name in NECK])
         self._collar = at["clavicle.L"] - at["spine01"]
-        # the middle finger's first joint but one: a hand's capsule leaves out the fingertips
-        arm = [at[f"{name}.L"] for name in ("clavicle", "upperarm01", "lowerarm01", "wrist")]
-        self._arm = np.diff([*arm, at["finger3-2.L"]], axis=0)
+        # to the middle finger's first joint but one: a hand's capsule leaves out the fingertips
+        arm_bones = ("clavicle", "upperarm01", "lowerarm01", "wrist", "finger3-2")
+        arm = [at[f"{name}.L"] for name in arm_bones]
+        self._arm = np.diff(arm, axis=0)
+        # a foot's capsule begins a little behind the ankle, low in the heel
         toes, heel = at["toe2-2.L"], at["foot.L"] * [1, 1, 0] + [0, 0.02, 0.035]
-        leg = [at[f"{name}.L"] for name in ("upperleg01", "lowerleg01", "foot")]
-        self._hip = leg[0] - at["root"]
-        self._leg = np.array([leg[1] - leg[0], leg[2] - leg[1], heel - leg[2], toes - leg[2]])
+        hip, knee, ankle = (at[f"{name}.L"] for name in ("upperleg01", "lowerleg01", "foot"))
+        self._hip = hip - at["root"]
+        self._leg = np.array([knee - hip, ankle - knee, heel - ankle, toes - ankle])
         self._trunk_heads = np.array([at[name] for name in TORSO_BONES])
         self._crown = at["head"]
         self.radii = np.empty((len(PARTS), 2))
         self._trunk = np.empty((5, 2, 3))
-        self._measure(
-            model, body, dict(zip(LIMBS, self._rest_segments(arm, at, leg, heel), strict=True))
+        self._measure_limbs(
+            model, body, [*pairwise(arm[1:]), (hip, knee), (knee, ankle), (heel, toes)]
         )
-        self.allowed = np.full(len(FIRST), -TOUCHING)
-        self.allowed = np.minimum(self.allowed, self.contacts(self.at_rest()).gaps)
+        self._measure_trunk(model, body)
+        # at rest with some room: arms and legs a little away from the body
+        away, leg = Arm(abduction=0.75, elbow=0.5), Leg(out=0.08)
+        at_rest = self.place(Pose(left_arm=away, right_arm=away, left_leg=leg, right_leg=leg))
+        self.allowed = np.minimum(-TOUCHING, self.contacts(at_rest).gaps)
 
-    @staticmethod
-    def _rest_segments(arm: list, at: dict, leg: list, heel: np.ndarray) -> list:
-        ends = [at["finger3-2.L"], leg[1], leg[2], at["toe2-2.L"]]
-        starts = [arm[3], leg[0], leg[1], heel]
-        return [(arm[1], arm[2]), (arm[2], arm[3]), *zip(starts, ends, strict=True)]
-
-    def _measure(self, model: BodyModel, body: Body, segments: dict) -> None:
-        """Radii of limbs; segments and radii of the trunk."""
+    def _measure_limbs(self, model: BodyModel, body: Body, segments: list) -> None:
         skin_of = _skin_parts(model)
-        for limb, (start, end) in segments.items():
+        for limb, (start, end) in zip(LIMBS, segments, strict=True):
             low = _SPAN.get(limb, 0.0)
             skin = body.points[skin_of[limb]].astype(np.float64)
             radii = _radii(skin, start + low * (end - start), end)
             if limb in ("hand", "foot"):  # flat: between half the thickness and half the width
                 radii = 0.75 * radii[0], 0.75 * radii[1]
             self.radii[[INDEX[f"{limb}.L"], INDEX[f"{limb}.R"]]] = radii
+
+    def _measure_trunk(self, model: BodyModel, body: Body) -> None:
+        """Measure segments and radii of the torso, by slices at four heights, and of the head."""
+        skin_of = _skin_parts(model)
         trunk = body.points[skin_of["trunk"]].astype(np.float64)
-        hips = body.joint("upperleg01.L")[2]
-        heights = [hips - 0.01, body.joint("spine04")[2], body.joint("spine03")[2] + 0.06]
-        heights.append(body.joint("spine01")[2] + 0.02)
-        for i, height in enumerate(heights):
-            self._trunk[i], self.radii[i] = _slab(
-                trunk[np.abs(trunk[:, 2] - height) < 0.04], height
-            )
+        # hips, waist, breast and armpits, so far above the joints nearest to them
+        bones = (("upperleg01.L", -0.01), ("spine04", 0), ("spine03", 0.06), ("spine01", 0.02))
+        for i, (bone, above) in enumerate(bones):
+            height = body.joint(bone)[2] + above
+            skin = trunk[np.abs(trunk[:, 2] - height) < 0.04]
+            front, back = skin[:, 1].min(), skin[:, 1].max()
+            radius, middle = (back - front) / 2, (front + back) / 2
+            # from side to side; the outermost 2 % may be an arm's root
+            half = max(np.quantile(np.abs(skin[:, 0]), 0.98) - radius, 0.01)
+            self._trunk[i] = [[half, middle, height], [-half, middle, height]]
+            self.radii[i] = radius
         skull = body.points[skin_of["head"]].astype(np.float64)
         skull = skull[skull[:, 2] > body.joint("head")[2]]
         width = np.ptp(skull[:, 0]) / 2
@@ -174,16 +177,10 @@ class Capsules:
         self._trunk[:4] -= self._trunk_heads[:, None]
         self._trunk[4] -= self._crown
 
-    def at_rest(self) -> Placement:
-        """Arms and legs a little away from the body, as in a relaxed stand with some room."""
-        arm, leg = Arm(abduction=0.75, elbow=0.5), Leg(out=0.08)
-        return self.place(Pose(left_arm=arm, right_arm=arm, left_leg=leg, right_leg=leg))
-
     def place(self, pose: Pose) -> Placement:
-        """Pose the capsules (without the pose's offset, which moves all alike)."""
+        """Pose the capsules, without the pose's offset, which moves all alike."""
         upright = turned(0, 0, pose.turn)
-        bend = pose.pelvis
-        pelvis = upright @ rotation(bend.forward, bend.side, bend.turn)
+        pelvis = upright @ _share(pose.pelvis, 1)
         segments = np.empty((len(PARTS), 2, 3))
         root = self._trunk_heads[0]
         segments[0] = root + self._trunk[0] @ pelvis.T
@@ -209,35 +206,25 @@ class Capsules:
     def _place_spine(
         self, pose: Pose, pelvis: Matrix, segments: np.ndarray
     ) -> tuple[Matrix, np.ndarray]:
-        share = 1 / len(SPINE)
-        bend = pose.spine
-        step = rotation(share * bend.forward, share * bend.side, share * bend.turn)
-        turn, place = pelvis, self._spine[0]
-        for i in range(len(SPINE)):
-            if i:
-                place = place + turn @ (self._spine[i] - self._spine[i - 1])
+        turn, place, before = pelvis, self._spine[0], self._spine[0]
+        step = _share(pose.spine, len(SPINE))
+        for bone, head in zip(SPINE, self._spine, strict=True):
+            place, before = place + turn @ (head - before), head
             turn = turn @ step
-            if i in (1, 3, 4):  # spine04, spine02, spine01
-                part = (0, 1, 0, 2, 3)[i]
+            if bone in TORSO_BONES:
+                part = TORSO_BONES.index(bone)
                 segments[part] = place + self._trunk[part] @ turn.T
         chest, base = turn, place
-        share = 1 / len(NECK)
-        bend = pose.head
-        step = rotation(share * bend.forward, share * bend.side, share * bend.turn)
-        before = self._spine[-1]
+        step = _share(pose.head, len(NECK))
         for head in self._neck:
-            place = place + turn @ (head - before)
-            turn, before = turn @ step, head
+            place, before = place + turn @ (head - before), head
+            turn = turn @ step
         segments[4] = place + self._trunk[4] @ turn.T
         return chest, base
 
     def _arm_points(self, arm: Arm) -> Points:
-        """Shoulder, elbow, wrist and knuckles of a left arm against `spine01`."""
-        chain = arm_chain(arm)
-        upper = chain @ self.rest.upper_arm
-        chain = chain @ turned(-arm.elbow, 0, 0)
-        fore = chain @ self.rest.forearm
-        hand = chain @ hand_chain(arm)
+        """Find shoulder, elbow, wrist and knuckles of a left arm against `spine01`."""
+        upper, fore, hand = arm_turns(arm, self.rest)
         points = np.empty((4, 3))
         points[0] = self._collar + collar_bone(upper, self.rest, arm.shrug) @ self._arm[0]
         points[1] = points[0] + upper @ self._arm[1]
@@ -246,18 +233,16 @@ class Capsules:
         return points
 
     def _leg_points(self, leg: Leg) -> Points:
-        """Hip, knee, ankle, heel and toes of a left leg against the hip."""
-        chain = leg_chain(leg)
-        points = np.empty((5, 3))
-        points[0] = 0
-        points[1] = (chain @ self.rest.leg) @ self._leg[0]
-        chain = chain @ turned(leg.knee, 0, 0)
-        points[2] = points[1] + (chain @ self.rest.leg) @ self._leg[1]
-        points[3:] = points[2] + self._leg[2:] @ (chain @ foot_chain(leg)).T
+        """Find hip, knee, ankle, heel and toes of a left leg against the hip."""
+        thigh, shin, foot = leg_turns(leg_chain(leg), leg, self.rest)
+        points = np.zeros((5, 3))
+        points[1] = thigh @ self._leg[0]
+        points[2] = points[1] + shin @ self._leg[1]
+        points[3:] = points[2] + self._leg[2:] @ foot.T
         return points
 
     def contacts(self, placement: Placement) -> Contacts:
-        """All tested pairs."""
+        """Measure all tested pairs."""
         a, b = placement.starts, placement.ends - placement.starts
         s, t = _closest(a[FIRST], b[FIRST], a[SECOND], b[SECOND])
         near, far = a[FIRST] + s[:, None] * b[FIRST], a[SECOND] + t[:, None] * b[SECOND]
@@ -268,9 +253,14 @@ class Capsules:
         return Contacts(distance - reach, near, far, between / np.maximum(distance, 1e-6)[:, None])
 
 
+def _share(bend: Bend, bones: int) -> Matrix:
+    """Give each of so many bones the same part of a bend."""
+    return rotation(*(1 / bones * angle for angle in astuple(bend)))
+
+
 @lru_cache(maxsize=1)
 def _skin_parts(model: BodyModel) -> dict[str, np.ndarray]:
-    """Which vertices belong to each of the left limbs, the trunk and the head, for every shape."""
+    """Choose the vertices of each of the left limbs, the trunk and the head, for every shape."""
     owner = np.asarray(model.weights.matrix.argmax(axis=1)).ravel()
     names = [model.skeleton.names[bone] for bone in owner]
     parts = {
@@ -284,30 +274,19 @@ def _skin_parts(model: BodyModel) -> dict[str, np.ndarray]:
 
 
 def _radii(skin: Points, start: np.ndarray, end: np.ndarray) -> tuple[float, float]:
-    """A limb's radius near its start and near its end: what 70 % of the skin there lies within."""
+    """Measure a limb near its start and near its end: what 70 % of the skin there lies within."""
     axis = end - start
     along = (skin - start) @ axis / (axis @ axis)
     distance = np.linalg.norm(skin - start - along[:, None] * axis, axis=1)
     near, far = distance[(along > 0) & (along < 0.4)], distance[(along > 0.6) & (along < 1)]
-    return _exceeded_by_30_percent(near), _exceeded_by_30_percent(far)
-
-
-def _exceeded_by_30_percent(values: Numbers) -> float:
-    place = int(0.7 * (len(values) - 1))
-    return float(np.partition(values, place)[place])  # ten times as quick as np.quantile
-
-
-def _slab(skin: Points, height: float) -> tuple[np.ndarray, float]:
-    """A segment from side to side, and its radius, that fill a slice of the torso."""
-    front, back = skin[:, 1].min(), skin[:, 1].max()
-    radius = (back - front) / 2
-    half = max(np.quantile(np.abs(skin[:, 0]), 0.98) - radius, 0.01)
-    middle = (front + back) / 2
-    return np.array([[half, middle, height], [-half, middle, height]]), float(radius)
+    places = [int(0.7 * (len(values) - 1)) for values in (near, far)]
+    # ten times as quick as np.quantile
+    low, high = (np.partition(v, k)[k] for v, k in zip((near, far), places, strict=True))
+    return float(low), float(high)
 
 
 def _closest(p: Points, d: Points, q: Points, e: Points) -> tuple[Numbers, Numbers]:
-    """Where along segments p + s d and q + t e they are closest, s and t in [0, 1].
+    """Find where segments p + s d and q + t e are closest, s and t in [0, 1].
 
     Source: Ericson, Real-Time Collision Detection (2005), Sec. 5.1.9.
     """

@@ -1,8 +1,8 @@
 """From where limbs point to how bones turn, shared by angles and by captured motion.
 
-A limb segment's `turn` is the rotation that takes it from the rest pose to its place, in the axes
-of the chest (arms) or of the pelvis (legs). Everything is written for the left side; the right side
-is its mirror image.
+Convention: a limb segment's `turn` is the rotation that takes it from the rest pose to its place,
+in the axes of the chest (arms) or of the pelvis (legs). Everything is written for the left side;
+the right side is its mirror image. Angles are radians.
 
 Zero pose: arms and legs hang straight down, palms to the body, toes forward. `Rest` holds the
 rotation from the rest pose to it for each segment, so a segment's turn is `chain @ rest.segment`
@@ -30,49 +30,51 @@ NECK = ("neck01", "neck02", "neck03", "head")
 TOES = ("toe1-1", "toe2-1", "toe3-1", "toe4-1", "toe5-1")
 FINGERS = (2, 3, 4, 5)  # index to little finger, as the bones count; the thumb is 1
 OPEN = np.radians([0.0, 5.0, 3.0])  # knuckle, middle and end joint of a flat hand
-FIST = np.radians([80.0, 100.0, 60.0])
-TWIST_IN_FOREARM = 0.6  # of the hand's turn about the forearm; skin shears less than at the wrist
-# Zero frames: columns are the direction, the hinge (or the thumb's side), and their cross product
+FIST = np.radians([80.0, 100.0, 60.0])  # both by eye, on the body's own hand
+TWIST_IN_FOREARM = 0.6
+"""Share of the hand's turn about the forearm: skin shears less there than at the wrist."""
+
+# zero frames: columns are the direction, the hinge (or the thumb's side), and their cross product
 ARM_AT_ZERO = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
 HAND_AT_ZERO = np.array([[0.0, 0, -1], [0, -1, 0], [-1, 0, 0]])
 LEG_AT_ZERO = np.array([[0.0, 1, 0], [0, 0, -1], [-1, 0, 0]])
 
 
 def unit(vector: Vector) -> Vector:
-    """A vector's direction."""
+    """Find a vector's direction."""
     return vector / np.sqrt(vector @ vector)
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """The cross product; ten times as quick as NumPy's for one pair."""
+    """Multiply crosswise; for one pair ten times as quick as NumPy."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def rotation(x: float, y: float, z: float) -> Matrix:
-    """The matrix of a rotation vector, radians."""
+    """Make the matrix of a rotation vector."""
     return cv2.Rodrigues(np.array([x, y, z], np.float64))[0]
 
 
 def turned(x: float, y: float, z: float) -> Matrix:
-    """Turns about the axes one after the other, z first: Rx(x) Ry(y) Rz(z), radians."""
+    """Turn about the axes one after the other, z first: Rx(x) Ry(y) Rz(z)."""
     a, b, c, d, e, f = cos(x), sin(x), cos(y), sin(y), cos(z), sin(z)
     rows = (c * e, -c * f, d), (a * f + b * d * e, a * e - b * d * f, -b * c)
     return np.array([*rows, (b * f - a * d * e, b * e + a * d * f, a * c)])
 
 
 def about(axis: Vector, angle: float) -> Matrix:
-    """The matrix that turns by an angle about a unit axis, counter-clockwise against it."""
+    """Make the matrix that turns about a unit axis, counter-clockwise against it."""
     return cv2.Rodrigues(axis * angle)[0]
 
 
 def rotation_vector(matrix: Matrix) -> Vector:
-    """The shortest rotation vector of a matrix, radians."""
+    """Find the shortest rotation vector of a matrix."""
     return cv2.Rodrigues(np.ascontiguousarray(matrix))[0][:, 0]
 
 
 def twist_angle(matrix: Matrix, axis: Vector) -> float:
-    """How far a rotation turns about a unit axis (the twist of swing and twist), in [-pi, pi]."""
+    """Measure how far a rotation turns about a unit axis (as in swing and twist), -pi .. pi."""
     skew = np.array(
         [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]
     )
@@ -80,7 +82,7 @@ def twist_angle(matrix: Matrix, axis: Vector) -> float:
 
 
 def frame(direction: Vector, side: Vector) -> Matrix:
-    """Columns: a direction, `side` made perpendicular to it, and their cross product; units."""
+    """Make unit columns: a direction, `side` made perpendicular to it, and their cross product."""
     first = unit(direction)
     second = unit(side - (side @ first) * first)
     return np.stack([first, second, cross(first, second)], 1)
@@ -91,11 +93,11 @@ class Rest:
     """What a body's rest pose says about its left limbs.
 
     Attributes:
-        upper_arm, forearm, hand, leg: rotations from the rest pose to the zero pose.
-        upper_axis, fore_axis, leg_axis: directions at rest.
-        hinge: the axis at rest about which the elbow bends.
-        curl_axis, thumb_axis: about which fingers and thumb curl, at rest.
-        finger_angles: 4 x 3, how far each finger's joints are bent at rest, radians.
+        upper_arm, forearm, hand, leg: Rotations from the rest pose to the zero pose.
+        upper_axis, fore_axis, leg_axis: Directions at rest.
+        hinge: The axis at rest about which the elbow bends.
+        curl_axis, thumb_axis: The axes at rest about which fingers and thumb curl.
+        finger_angles: 4 x 3: how far each finger's joints are bent at rest.
     """
 
     upper_arm: Matrix
@@ -123,6 +125,11 @@ class Rest:
         hand = frame(fingers[1][0] - wrist, fingers[0][0] - fingers[3][0])
         thumb = heads[index["finger1-3.L"]] - heads[index["finger1-2.L"]]
         curl_axis = cross(hand[:, 0], hand[:, 2])
+        across, angles = cross(curl_axis, hand[:, 0]), np.empty((4, 3))
+        for row, bones in zip(angles, np.diff(fingers, axis=1), strict=True):
+            near, far = (np.arctan2(bone @ across, bone @ hand[:, 0]) for bone in bones)
+            # the last bone's end is not in the model; as in a relaxed hand
+            row[:] = near, far - near, 0.6 * (far - near)
         # a knee looks straight where hip, knee and ankle are slightly bent (about 8 degrees), so
         # thigh and shin share the line from hip to ankle
         leg = frame(heads[index["foot.L"]] - heads[index["upperleg01.L"]], np.array([1.0, 0, 0]))
@@ -136,36 +143,14 @@ class Rest:
             leg_axis=leg[:, 0],
             hinge=hinge,
             curl_axis=curl_axis,
+            # a thumb closes neither across the palm nor along it, but between the two
             thumb_axis=unit(cross(thumb, 0.5 * hand[:, 2] - hand[:, 1])),
-            finger_angles=_finger_angles(fingers, hand[:, 0], curl_axis),
+            finger_angles=angles,
         )
 
 
-def _finger_angles(
-    fingers: list[list[Vector]], direction: Vector, axis: Vector
-) -> Float64[np.ndarray, "4 3"]:
-    across = cross(axis, direction)
-    angles = np.empty((4, 3))
-    for row, (first, second, third) in zip(angles, fingers, strict=True):
-        near, far = second - first, third - second
-        row[0] = np.arctan2(near @ across, near @ direction)
-        row[1] = np.arctan2(far @ across, far @ direction) - row[0]
-        row[2] = 0.6 * row[1]  # the last bone's end is not in the model; as in a relaxed hand
-    return angles
-
-
-def spine_bones(bend: Vector) -> Bones:
-    """The chest's rotation vector against the pelvis, in equal shares."""
-    return dict.fromkeys(SPINE, cv2.Rodrigues(bend / len(SPINE))[0])
-
-
-def neck_bones(bend: Vector) -> Bones:
-    """The head's rotation vector against the chest, in equal shares."""
-    return dict.fromkeys(NECK, cv2.Rodrigues(bend / len(NECK))[0])
-
-
 def arm_bones(rest: Rest, clavicle: Matrix, upper: Matrix, fore: Matrix, hand: Matrix) -> Bones:
-    """The left arm's bones from its segments' turns.
+    """Turn the left arm's bones, given its segments' turns.
 
     Upper arm and forearm each spread their twist over two bones: all of it at one joint would pinch
     the skin like a sweet's wrapper.
@@ -186,19 +171,20 @@ def arm_bones(rest: Rest, clavicle: Matrix, upper: Matrix, fore: Matrix, hand: M
 
 
 def finger_bones(rest: Rest, curl: float) -> Bones:
-    """The left hand's fingers: 0 flat, 1 a fist."""
+    """Bend the left hand's fingers: 0 is flat, 1 a fist."""
     bones = {}
     for finger, at_rest in zip(FINGERS, rest.finger_angles, strict=True):
         share = curl * (0.86 + 0.05 * (finger - 2))  # a relaxed little finger is bent the most
         for joint, angle in enumerate(OPEN + share * (FIST - OPEN) - at_rest, 1):
             bones[f"finger{finger}-{joint}"] = about(rest.curl_axis, angle)
+    # the thumb rests as in a relaxed hand (0.3) and bends most at its tip
     for joint, angle in enumerate((0.35, 0.6, 0.9), 1):
         bones[f"finger1-{joint}"] = about(rest.thumb_axis, angle * (curl - 0.3))
     return bones
 
 
 def leg_bones(rest: Rest, thigh: Matrix, shin: Matrix, foot: Matrix, toes: float = 0.0) -> Bones:
-    """The left leg's bones from its segments' turns; `toes` bends them up, radians."""
+    """Turn the left leg's bones, given its segments' turns; `toes` bends them up."""
     half = about(rest.leg_axis, 0.5 * twist_angle(thigh, rest.leg_axis))
     bones = {
         "upperleg01": thigh @ half.T,
@@ -212,11 +198,22 @@ def leg_bones(rest: Rest, thigh: Matrix, shin: Matrix, foot: Matrix, toes: float
 
 
 def mirrored_matrix(matrix: Matrix) -> Matrix:
-    """The rotation that a mirror through the body's middle shows."""
+    """Turn a rotation into the one that a mirror through the body's middle shows."""
     return matrix * np.outer(MIRROR, MIRROR)
 
 
-def both_sides(left: Bones, right: Bones) -> Bones:
-    """Name the bones of two sides, each given as if it were the left one."""
-    bones = {f"{name}.L": matrix for name, matrix in left.items()}
-    return bones | {f"{name}.R": mirrored_matrix(matrix) for name, matrix in right.items()}
+def whole_body(root: Matrix, spine: Vector, neck: Vector, left: Bones, right: Bones) -> Bones:
+    """Name all bones that turn.
+
+    Args:
+        root: The pelvis's rotation.
+        spine, neck: Rotation vectors of chest and head, spread evenly over what carries them.
+        left, right: Each side's bones, both as if they were the left one's.
+    """
+    return {
+        "root": root,
+        **dict.fromkeys(SPINE, cv2.Rodrigues(spine / len(SPINE))[0]),
+        **dict.fromkeys(NECK, cv2.Rodrigues(neck / len(NECK))[0]),
+        **{f"{name}.L": matrix for name, matrix in left.items()},
+        **{f"{name}.R": mirrored_matrix(matrix) for name, matrix in right.items()},
+    }

@@ -1,4 +1,4 @@
-"""A pose as joint angles with a meaning, and the bone rotations that make it.
+"""A pose as joint angles with a meaning, the bone rotations that make it, and the body in it.
 
 Convention: radians. All zero is an upright person who faces the camera (-y), arms and legs straight
 down, palms to the body, toes forward. Every angle of a limb means the same on both sides (positive
@@ -8,33 +8,31 @@ abduction moves either arm away from the body). Chains are read from the trunk o
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import astuple, dataclass, field, fields, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from motion_transfer.people.figure.body import Body
+from motion_transfer.people.figure.body import Body, BodyModel, Rotations
+from motion_transfer.people.figure.mesh import PosedBody
 from motion_transfer.people.motion.limbs import (
     Bones,
     Matrix,
     Rest,
-    Vector,
     arm_bones,
-    both_sides,
     finger_bones,
     leg_bones,
-    neck_bones,
     rotation,
-    spine_bones,
     turned,
+    whole_body,
 )
 
 Row = Float64[np.ndarray, "numbers"]
-Shift = Float32[np.ndarray, "3"]
 
-RELAXED, FIST, OPEN = 0.3, 1.0, 0.0
-"""Finger curls."""
+RELAXED = 0.3
+"""Curl of the fingers of a hand that does nothing."""
 
 
 @dataclass(frozen=True)
@@ -42,16 +40,16 @@ class Arm:
     """Angles of one arm against the chest.
 
     Attributes:
-        swing: lifts the arm forward (shoulder flexion), applied after `abduction`: at a swing of
+        swing: Lifts the arm forward (shoulder flexion), applied after `abduction`: at a swing of
             90 degrees abduction moves the arm sideways in the horizontal plane.
-        abduction: lifts it sideways, away from the body.
-        turn_out: turns it outwards about its own length.
-        elbow: bends it; the forearm comes forward when the arm hangs.
-        pronation: turns the hand, thumb towards the body when the arm hangs; palm back.
-        wrist: bends the hand to the palm's side (flexion).
-        wrist_side: bends it to the thumb's side (radial deviation).
-        shrug: lifts the shoulder, besides what a raised arm does by itself.
-        curl: of the fingers: 0 flat, 0.3 relaxed, 1 a fist.
+        abduction: Lifts it sideways, away from the body.
+        turn_out: Turns it outwards about its own length.
+        elbow: Bends it; the forearm comes forward when the arm hangs.
+        pronation: Turns the hand, thumb towards the body when the arm hangs; palm back.
+        wrist: Bends the hand to the palm's side (flexion).
+        wrist_side: Bends it to the thumb's side (radial deviation).
+        shrug: Lifts the shoulder, besides what a raised arm does by itself.
+        curl: Closes the fingers: 0 flat, 0.3 relaxed, 1 a fist; no angle.
     """
 
     swing: float = 0.0
@@ -70,13 +68,13 @@ class Leg:
     """Angles of one leg, measured from the upright, so that a tilting pelvis leaves legs in place.
 
     Attributes:
-        hip: lifts the thigh forward, applied after `out`.
-        out: lifts it sideways (abduction).
-        turn_out: turns it outwards about its own length.
-        knee: bends it, the shin goes back.
-        ankle: lifts the foot (dorsiflexion); negative points it.
-        roll: turns the sole inwards (inversion); keeps it flat under a leg that stands out.
-        toes: lifts the toes against the foot.
+        hip: Lifts the thigh forward, applied after `out`.
+        out: Lifts it sideways (abduction).
+        turn_out: Turns it outwards about its own length.
+        knee: Bends it, the shin goes back.
+        ankle: Lifts the foot (dorsiflexion); negative points it.
+        roll: Turns the sole inwards (inversion); keeps it flat under a leg that stands out.
+        toes: Lifts the toes against the foot.
     """
 
     hip: float = 0.0
@@ -93,9 +91,9 @@ class Bend:
     """A rotation vector of pelvis, spine or head against what carries it.
 
     Attributes:
-        forward: bends forward.
-        side: bends to the person's left.
-        turn: turns to the person's left.
+        forward: Bends forward.
+        side: Bends to the person's left.
+        turn: Turns to the person's left.
     """
 
     forward: float = 0.0
@@ -108,14 +106,14 @@ class Pose:
     """A whole body.
 
     Attributes:
-        turn: about the vertical, 0 faces the camera, positive to the person's left.
-        left_arm, right_arm, left_leg, right_leg: limbs.
-        pelvis: against the upright; carries spine and head, not the legs.
-        spine: of the chest against the pelvis, spread over the spine.
-        head: against the chest, spread over the neck.
-        offset: metres. x and y move the pelvis from where it rests; z is the height of the body's
+        turn: Turns all about the vertical: 0 faces the camera, positive to the person's left.
+        left_arm, right_arm, left_leg, right_leg: Limbs.
+        pelvis: Bends the pelvis against the upright; carries spine and head, not the legs.
+        spine: Bends the chest against the pelvis, spread over the spine.
+        head: Bends the head against the chest, spread over the neck.
+        offset: Metres. x and y move the pelvis from where it rests; z is the height of the body's
             lowest point above the floor (0 stands or sits, positive jumps): see `placed`.
-        touches: pairs of body parts (`hand.L`, `hips`, ...: see `capsules`) that should rest on
+        touches: Pairs of body parts (`hand.L`, `hips`, ...: see `capsules`) that should rest on
             each other; `untangled` closes the gap that another body's build leaves.
     """
 
@@ -132,6 +130,9 @@ class Pose:
 
 
 PARTS = ("left_arm", "right_arm", "left_leg", "right_leg", "pelvis", "spine", "head")
+_KINDS: dict[str, type[Arm | Leg | Bend]] = dict(
+    zip(PARTS, (Arm, Arm, Leg, Leg, Bend, Bend, Bend), strict=True)
+)
 
 
 def _degrees(low: float, high: float) -> tuple[float, float]:
@@ -141,9 +142,7 @@ def _degrees(low: float, high: float) -> tuple[float, float]:
 LIMITS: dict[str, dict[str, tuple[float, float]]] = {
     "arm": {
         "swing": _degrees(-60, 180),  # extension, flexion
-        "abduction": _degrees(
-            -50, 180
-        ),  # adduction across the front (Kapandji: 30 to 45), abduction
+        "abduction": _degrees(-50, 180),  # adduction in front (Kapandji: 30 to 45), abduction
         "turn_out": _degrees(-95, 90),  # internal (AAOS 70; a hand on the back needs 95), external
         "elbow": _degrees(0, 150),
         "pronation": _degrees(-80, 80),
@@ -155,9 +154,7 @@ LIMITS: dict[str, dict[str, tuple[float, float]]] = {
     "leg": {
         "hip": _degrees(-40, 145),  # AAOS -30, 120 against the pelvis, which can tilt along
         "out": _degrees(-30, 60),  # adduction; abduction AAOS 45, more in a dancer with hips turned
-        "turn_out": _degrees(
-            -45, 60
-        ),  # AAOS 45 and 45; more with a bent hip (sitting cross-legged)
+        "turn_out": _degrees(-45, 60),  # AAOS 45 and 45; more with a bent hip (cross-legged)
         "knee": _degrees(0, 140),
         "ankle": _degrees(-50, 20),  # plantar flexion, dorsiflexion
         "roll": _degrees(-20, 35),  # eversion, inversion
@@ -172,49 +169,37 @@ LIMITS: dict[str, dict[str, tuple[float, float]]] = {
 ranges of motion (Joint Motion: Method of Measuring and Recording, 1965) unless a line says more."""
 
 
-def limits_of(part: str) -> dict[str, tuple[float, float]]:
-    """The limits of a pose's part: `left_arm` has those of `arm`. Raises: KeyError."""
-    return LIMITS[part.removeprefix("left_").removeprefix("right_")]
-
-
 def angles(pose: Pose) -> Iterator[tuple[str, str, float, tuple[float, float]]]:
-    """Every limited angle: part, name, value and its limits."""
+    """List every limited angle: part, name, value, and its lowest and highest value."""
     for part in PARTS:
         values = getattr(pose, part)
-        for name, limits in limits_of(part).items():
+        for name, limits in LIMITS[part.removeprefix("left_").removeprefix("right_")].items():
             yield part, name, getattr(values, name), limits
 
 
 def clamped(pose: Pose) -> Pose:
-    """The same pose with every angle inside its limits."""
-    changes = {}
-    for part in PARTS:
-        values = getattr(pose, part)
-        kept = {
-            name: min(max(getattr(values, name), low), high)
-            for name, (low, high) in limits_of(part).items()
-        }
-        changes[part] = type(values)(**kept)
-    return replace(pose, **changes)
+    """Bring every angle of a pose inside its limits."""
+    kept: dict[str, dict[str, float]] = {part: {} for part in PARTS}
+    for part, name, value, (low, high) in angles(pose):
+        kept[part][name] = min(max(value, low), high)
+    parts: dict[str, Any] = {part: _KINDS[part](**values) for part, values in kept.items()}
+    return replace(pose, **parts)
 
 
 def numbers(pose: Pose) -> Row:
-    """A pose as one row, for interpolation; `touches` is not in it."""
-    rows = [getattr(getattr(pose, part), f.name) for part in PARTS for f in fields(_KINDS[part])]
-    return np.array([pose.turn, *pose.offset, *rows])
+    """Write a pose as one row, for interpolation; `touches` is not in it."""
+    values = [value for part in PARTS for value in astuple(getattr(pose, part))]
+    return np.array([pose.turn, *pose.offset, *values])
 
 
 def from_numbers(row: Row) -> Pose:
-    """The way back from `numbers`."""
+    """Read a pose from a row of `numbers`."""
     values = iter(row.tolist())
     turn, offset = next(values), (next(values), next(values), next(values))
     parts: dict[str, Any] = {
-        part: _KINDS[part](*(next(values) for _ in fields(_KINDS[part]))) for part in PARTS
+        part: kind(*islice(values, len(fields(kind)))) for part, kind in _KINDS.items()
     }
     return Pose(turn=turn, offset=offset, **parts)
-
-
-_KINDS = dict(zip(PARTS, (Arm, Arm, Leg, Leg, Bend, Bend, Bend), strict=True))
 
 
 def _other_side(bend: Bend) -> Bend:
@@ -222,7 +207,7 @@ def _other_side(bend: Bend) -> Bend:
 
 
 def mirrored(pose: Pose) -> Pose:
-    """The pose as a mirror shows it: left and right change places, turns change sign."""
+    """Turn a pose into what a mirror shows: left and right change places, turns change sign."""
     swap = str.maketrans("LR", "RL")
     return Pose(
         turn=-pose.turn,
@@ -238,39 +223,35 @@ def mirrored(pose: Pose) -> Pose:
     )
 
 
-def blend(a: Pose, b: Pose, t: float) -> Pose:
-    """Between two poses, each angle by itself: t = 0 is `a`, t = 1 is `b`.
-
-    `turn` goes the short way round. What touches in both keeps touching.
-    """
-    first, second = numbers(a), numbers(b)
-    second[0] = first[0] + (second[0] - first[0] + np.pi) % (2 * np.pi) - np.pi
-    touches = tuple(pair for pair in a.touches if pair in b.touches)
-    return replace(from_numbers(first + t * (second - first)), touches=touches)
-
-
 def arm_chain(arm: Arm) -> Matrix:
-    """The shoulder's rotation from the zero pose, in the chest's axes, left side."""
+    """Find the shoulder's rotation from the zero pose, in the chest's axes, left side."""
     return turned(-arm.swing, -arm.abduction, arm.turn_out)
 
 
 def leg_chain(leg: Leg) -> Matrix:
-    """The hip's rotation from the zero pose, in the upright's axes, left side."""
+    """Find the hip's rotation from the zero pose, in the upright's axes, left side."""
     return turned(-leg.hip, -leg.out, leg.turn_out)
 
 
-def hand_chain(arm: Arm) -> Matrix:
-    """The hand's rotation against the forearm, left side."""
-    return turned(0, 0, -arm.pronation) @ turned(-arm.wrist_side, arm.wrist, 0)
+def arm_turns(arm: Arm, rest: Rest) -> tuple[Matrix, Matrix, Matrix]:
+    """Turn the upper arm and the forearm from the rest pose, and the hand from the zero pose."""
+    chain = arm_chain(arm)
+    upper = chain @ rest.upper_arm
+    chain = chain @ turned(-arm.elbow, 0, 0)
+    hand = turned(0, 0, -arm.pronation) @ turned(-arm.wrist_side, arm.wrist, 0)
+    return upper, chain @ rest.forearm, chain @ hand
 
 
-def foot_chain(leg: Leg) -> Matrix:
-    """The foot's rotation against the shin, left side."""
-    return turned(-leg.ankle, leg.roll, 0)
+def leg_turns(chain: Matrix, leg: Leg, rest: Rest) -> tuple[Matrix, Matrix, Matrix]:
+    """Turn thigh, shin and foot from the rest pose, given the hip's rotation (see `leg_chain`)."""
+    thigh = chain @ rest.leg
+    chain = chain @ turned(leg.knee, 0, 0)
+    # the rest pose's foot is flat and points forward, as the zero pose's does
+    return thigh, chain @ rest.leg, chain @ turned(-leg.ankle, leg.roll, 0)
 
 
 def collar_bone(upper: Matrix, rest: Rest, shrug: float = 0.0) -> Matrix:
-    """How the shoulder follows the upper arm: up with a raised arm, forward with one in front.
+    """Let the shoulder follow the upper arm: up with a raised one, forward with one in front.
 
     The shoulder blade does about a third of an arm's lift beyond the first 30 degrees
     (scapulohumeral rhythm, Inman 1944); the collar bone, which alone is in the model, rises about
@@ -283,56 +264,59 @@ def collar_bone(upper: Matrix, rest: Rest, shrug: float = 0.0) -> Matrix:
     return turned(0, -lift, -forward)
 
 
-def _arm(arm: Arm, rest: Rest, fingers: bool) -> Bones:
-    chain = arm_chain(arm)
-    upper = chain @ rest.upper_arm
-    chain = chain @ turned(-arm.elbow, 0, 0)
-    fore = chain @ rest.forearm
-    hand = chain @ hand_chain(arm) @ rest.hand
-    bones = arm_bones(rest, collar_bone(upper, rest, arm.shrug), upper, fore, hand)
-    return bones | finger_bones(rest, arm.curl) if fingers else bones
-
-
-def _leg(leg: Leg, rest: Rest, pelvis: Matrix) -> Bones:
-    chain = pelvis.T @ leg_chain(leg)
-    thigh = chain @ rest.leg
-    chain = chain @ turned(leg.knee, 0, 0)
-    foot = chain @ foot_chain(leg)  # the rest pose's foot is flat and points forward
-    return leg_bones(rest, thigh, chain @ rest.leg, foot, leg.toes)
-
-
-def _vector(bend: Bend) -> Vector:
-    return np.array([bend.forward, bend.side, bend.turn])
-
-
-def rotations_at(pose: Pose, rest: Rest, *, fingers: bool = True) -> Bones:
-    """`pose_rotations` for a body already measured; without fingers where they do not matter."""
-    pelvis = rotation(*_vector(pose.pelvis))
-    other = rotation(*_vector(_other_side(pose.pelvis)))  # legs are both written as left ones
-    left = _arm(pose.left_arm, rest, fingers) | _leg(pose.left_leg, rest, pelvis)
-    right = _arm(pose.right_arm, rest, fingers) | _leg(pose.right_leg, rest, other)
+def _limbs(arm: Arm, leg: Leg, pelvis: Matrix, rest: Rest) -> Bones:
+    """Turn the bones of one side, as if it were the left one."""
+    upper, fore, hand = arm_turns(arm, rest)
+    collar = collar_bone(upper, rest, arm.shrug)
     return {
-        "root": turned(0, 0, pose.turn) @ pelvis,
-        **spine_bones(_vector(pose.spine)),
-        **neck_bones(_vector(pose.head)),
-        **both_sides(left, right),
+        **arm_bones(rest, collar, upper, fore, hand @ rest.hand),
+        **finger_bones(rest, arm.curl),
+        **leg_bones(rest, *leg_turns(pelvis.T @ leg_chain(leg), leg, rest), leg.toes),
     }
 
 
 def pose_rotations(pose: Pose, body: Body) -> Bones:
-    """Each turned bone's rotation, for `body.transforms`.
+    """Find each turned bone's rotation, for `body.transforms`.
 
     Leave `pose.offset` to `placed`, which knows the posed skin.
     """
-    return rotations_at(pose, Rest.of(body))
+    rest = Rest.of(body)
+    pelvis = rotation(*astuple(pose.pelvis))
+    other = rotation(*astuple(_other_side(pose.pelvis)))  # legs are both written as left ones
+    return whole_body(
+        turned(0, 0, pose.turn) @ pelvis,
+        np.array(astuple(pose.spine)),
+        np.array(astuple(pose.head)),
+        _limbs(pose.left_arm, pose.left_leg, pelvis, rest),
+        _limbs(pose.right_arm, pose.right_leg, other, rest),
+    )
 
 
-def placed(points: Float32[np.ndarray, "V 3"], pose: Pose) -> Shift:
-    """The shift that puts posed points where the pose wants them: add it to all that is drawn.
+def placed(points: Float32[np.ndarray, "V 3"], pose: Pose) -> Float32[np.ndarray, " 3"]:
+    """Find the shift that puts posed points where the pose wants them; add it to all that is drawn.
 
     Args:
-        points: the posed skin (without shift), metres.
+        points: The posed skin (without shift), metres.
     Returns: `pose.offset` in x and y; in z what brings the lowest point to `pose.offset[2]`.
     """
     x, y, z = pose.offset
     return np.array([x, y, z - points[:, 2].min()], np.float32)
+
+
+def posed(body: Body, pose: Pose, model: BodyModel) -> PosedBody:
+    """Pose a body, standing on the floor z = 0 (or as high above it as the pose says)."""
+    transforms = body.transforms(pose_rotations(pose, body))
+    points = model.pose(body, transforms)
+    shift = placed(points, pose)
+    points += shift
+    transforms[..., 3] += shift
+    return PosedBody(body, transforms, points, body.posed_joints(transforms))
+
+
+def moved(
+    body: Body, rotations: Rotations, offset: tuple[float, float, float], model: BodyModel
+) -> PosedBody:
+    """Turn a body's bones and move the whole of it by an offset in metres."""
+    transforms = body.transforms(rotations, offset)
+    points = model.pose(body, transforms)
+    return PosedBody(body, transforms, points, body.posed_joints(transforms))

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import acos, asin, atan2, cos, hypot, pi, sin, sqrt
+from typing import Any
 
 import numpy as np
 
 from motion_transfer.people.motion.limbs import turned
-from motion_transfer.people.motion.poses import Bend, Leg, leg_chain
+from motion_transfer.people.motion.poses import Bend, Leg, Pose, leg_chain
 
-HIP = 0.128  # half the distance between the hip joints; metres: 0.115 of 0.9 in the middle shape
+HIP = 0.128  # half the distance between the hip joints: 0.115 of 0.9 m in the middle shape
 HEEL = (0.05, 0.085)  # the ankle's place before and above the heel's lowest point
 BALL = (0.17, 0.06)  # the ball's place before and below the ankle
 STRAIGHT = 0.9995  # longest reach: a knee locked in the middle of a motion would jerk
@@ -25,10 +26,10 @@ class Foot:
     """Where one foot stands.
 
     Attributes:
-        forward, out: of its ankle from the place under the hip, legs.
-        heel: how far the heel is lifted about the ball, radians; negative stands on the heel.
-        turn_out: of the leg, outwards, radians.
-        lift: of the sole off the floor, legs.
+        forward, out: How far its ankle is from the place under the hip, legs.
+        heel: How far the heel is lifted about the ball, radians; negative stands on the heel.
+        turn_out: How far the leg is turned outwards, radians.
+        lift: Height of the sole above the floor, legs.
     """
 
     forward: float = 0.0
@@ -39,14 +40,14 @@ class Foot:
 
 
 def ankle_height(heel: float) -> float:
-    """The ankle's height above the floor, legs, for a foot pitched by `heel`."""
+    """Find the ankle's height above the floor, legs, for a foot pitched by `heel`."""
     if heel >= 0:
         return HEEL[1] + BALL[0] * sin(heel) - BALL[1] * (1 - cos(heel))
     return HEEL[1] * cos(heel) + HEEL[0] * sin(-heel)
 
 
 def leg_to(foot: Foot, height: float) -> Leg:
-    """The leg whose ankle is `height` legs below the hip, its sole level but for `heel`.
+    """Find the leg whose ankle is `height` legs below the hip, its sole level but for `heel`.
 
     A leg too short for that is straight and points there.
     """
@@ -70,15 +71,23 @@ def leg_to(foot: Foot, height: float) -> Leg:
     return Leg(hip, out, foot.turn_out, 2 * half, ankle, float(np.arcsin(up[0])), toes)
 
 
-def stance(
-    left: Foot, right: Foot, pelvis: Bend | None = None, *, sink: float = 0.0, height: float = 0.0
-) -> tuple[Leg, Leg]:
-    """Both legs of a person who stands on both feet.
+def standing(
+    left: Foot,
+    right: Foot,
+    pelvis: Bend | None = None,
+    *,
+    sink: float = 0.0,
+    height: float = 0.0,
+    **rest: Any,
+) -> Pose:
+    """Make the pose of a person who stands on both feet.
 
     Args:
-        pelvis: its tilt and turn move the hip joints, which the legs make up for.
-        sink: how much lower the hips are than the straighter leg would allow, legs.
-        height: of the hips above the ankles of flat feet, legs, instead of `sink`; 0 does not say.
+        pelvis: Its tilt and turn move the hip joints, which the legs make up for.
+        sink: How much lower the hips are than the straighter leg would allow, legs.
+        height: How high the hips are above the ankles of flat feet, legs, instead of `sink`; 0 does
+            not say.
+        rest: The pose's other parts.
     """
     pelvis = pelvis or Bend()
     places = []
@@ -89,4 +98,4 @@ def stance(
         places.append((Foot(forward, foot.out, foot.heel, foot.turn_out), drop, longest + drop))
     hips = height or min(longest for _, _, longest in places) - sink
     legs = [leg_to(foot, hips - drop) for foot, drop, _ in places]
-    return legs[0], legs[1]
+    return Pose(left_leg=legs[0], right_leg=legs[1], pelvis=pelvis, **rest)

@@ -8,7 +8,7 @@ should touch something ask for a pull in the same way. No randomness.
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import astuple, replace
 from typing import TypeVar
 
 import numpy as np
@@ -26,7 +26,7 @@ from motion_transfer.people.motion.limbs import MIRROR, turned
 from motion_transfer.people.motion.poses import Arm, Leg, Pose, arm_chain, clamped, leg_chain
 
 SLACK = 0.004  # metres beyond what is asked, so that steps end instead of creeping
-STEPS = 14
+STEPS = 14  # a pose that is still tangled then is eased instead
 DAMPING = 2e-3  # square metres a square radian: steps stay under some 0.3 radians
 TOUCH_ERROR = 0.008  # metres; a hand this near counts as touching
 ARM_ANGLES = ("swing", "abduction", "turn_out", "elbow")
@@ -35,18 +35,20 @@ LEG_ANGLES = ("hip", "out", "turn_out", "knee")
 WILLING = np.tile([1.0, 1.0, 0.7, 1.0, 0.15, 0.3, 0.15, 0.15], 2)
 Limb = TypeVar("Limb", Arm, Leg)
 EASY_ARM = Arm(swing=0.1, abduction=0.5, elbow=0.4)
+# shares of the way, of arms and of legs, to hanging free
+EASIER = ((0.35, 0.0), (0.7, 0.0), (1.0, 0.0), (1.0, 0.4), (1.0, 0.7), (1.0, 1.0))
 _PAIRS = {
     frozenset((PARTS[i], PARTS[j])): k for k, (i, j) in enumerate(zip(FIRST, SECOND, strict=True))
 }
 
 
 def limbs_apart(pose: Pose, capsules: Capsules) -> bool:
-    """Whether no limb goes through another or through the torso; touching is allowed."""
+    """Tell whether no limb goes through another or through the torso; touching is allowed."""
     return not len(_tangled(capsules.contacts(capsules.place(pose)), capsules))
 
 
 def untangled(pose: Pose, capsules: Capsules) -> Pose:
-    """The pose with limbs that go through each other parted, and hands brought to what they touch.
+    """Part the limbs of a pose that go through each other, and bring hands to what they touch.
 
     Inside the limits. Where the pushes find no way, the arms are moved towards hanging free and
     then the legs towards standing, until the limbs are apart.
@@ -63,48 +65,34 @@ def untangled(pose: Pose, capsules: Capsules) -> Pose:
         tangled = tangled[~np.isin(tangled, touching)]
         # a pair that touches has its own row, whether it is too near or too far
         rows = np.concatenate([tangled, touching])
-        wanted = np.concatenate(
-            [
-                capsules.allowed[tangled] - contacts.gaps[tangled] + SLACK,
-                -contacts.gaps[touching],
-            ]
-        )
+        apart = capsules.allowed[tangled] - contacts.gaps[tangled] + SLACK
+        wanted = np.concatenate([apart, -contacts.gaps[touching]])
         pose = _moved(pose, _jacobian(pose, placement, contacts, rows), wanted)
-    if limbs_apart(pose, capsules):
-        return pose
-    return _freed(start, capsules)
+    for arms, legs in EASIER:
+        if limbs_apart(pose, capsules):
+            break
+        pose = replace(
+            start,
+            left_arm=_mixed(start.left_arm, EASY_ARM, arms),
+            right_arm=_mixed(start.right_arm, EASY_ARM, arms),
+            left_leg=_mixed(start.left_leg, Leg(out=0.05), legs),
+            right_leg=_mixed(start.right_leg, Leg(out=0.05), legs),
+            touches=(),
+        )
+    return pose
 
 
 def _tangled(contacts: Contacts, capsules: Capsules) -> np.ndarray:
     return np.flatnonzero(contacts.gaps < capsules.allowed)
 
 
-def _freed(pose: Pose, capsules: Capsules) -> Pose:
-    """The first of a row of ever easier poses that has its limbs apart."""
-    for arms, legs in ((0.35, 0.0), (0.7, 0.0), (1.0, 0.0), (1.0, 0.4), (1.0, 0.7), (1.0, 1.0)):
-        eased = replace(
-            pose,
-            left_arm=_mixed(pose.left_arm, EASY_ARM, arms),
-            right_arm=_mixed(pose.right_arm, EASY_ARM, arms),
-            left_leg=_mixed(pose.left_leg, Leg(out=0.05), legs),
-            right_leg=_mixed(pose.right_leg, Leg(out=0.05), legs),
-            touches=(),
-        )
-        if limbs_apart(eased, capsules):
-            return eased
-    return eased
-
-
 def _mixed(limb: Limb, other: Limb, share: float) -> Limb:
-    mixed = {
-        f.name: (1 - share) * getattr(limb, f.name) + share * getattr(other, f.name)
-        for f in fields(limb)
-    }
-    return replace(limb, **mixed)
+    pairs = zip(astuple(limb), astuple(other), strict=True)
+    return type(limb)(*((1 - share) * a + share * b for a, b in pairs))
 
 
 def _moved(pose: Pose, jacobian: Float64[np.ndarray, "rows 16"], wanted: np.ndarray) -> Pose:
-    """Change the angles by the damped least-squares answer."""
+    """Change the angles by the damped least-squares answer, by 0.3 radians a step at most."""
     weighted = jacobian * WILLING
     square = weighted @ jacobian.T
     square.flat[:: len(square) + 1] += DAMPING
@@ -138,12 +126,24 @@ _MOVES = np.array(
 def _jacobian(
     pose: Pose, placement: Placement, contacts: Contacts, rows: np.ndarray
 ) -> Float64[np.ndarray, "rows 16"]:
-    """How fast each gap opens with each angle, metres a radian."""
-    axes = np.concatenate([_axes(pose, placement).reshape(4, 4, 3), np.zeros((1, 4, 3))])
+    """Measure how fast each gap opens with each angle, metres a radian."""
+    axes = np.zeros((5, 4, 3))  # of each group's angles; the fifth group is what none moves
     joints = np.zeros((5, 4, 3))  # about which each angle turns: three times the root, the middle
-    for side in (0, 1):
-        joints[2 * side] = placement.arms[side][[0, 0, 0, 1]]
-        joints[2 * side + 1] = placement.legs[side][[0, 0, 0, 1]]
+    for side, (arm, leg, mirror) in enumerate(
+        (
+            (pose.left_arm, pose.left_leg, np.ones(3)),
+            (pose.right_arm, pose.right_leg, -MIRROR),  # a mirrored rotation turns the other way
+        )
+    ):
+        # elbows bend forward and knees back, hence the signs
+        for group, swing, chain, bend, carrier, places in (
+            (2 * side, arm.swing, arm_chain(arm), -1, placement.chest, placement.arms),
+            (2 * side + 1, leg.hip, leg_chain(leg), 1, placement.upright, placement.legs),
+        ):
+            lift = turned(-swing, 0, 0)
+            local = np.array([[-1.0, 0, 0], -lift[:, 1], chain[:, 2], bend * chain[:, 0]])
+            axes[group] = (local * mirror) @ carrier.T
+            joints[group] = places[side][[0, 0, 0, 1]]
     out = np.zeros((len(rows), 5, 4))
     every = np.arange(len(rows))
     for parts, points, sign in (
@@ -156,21 +156,3 @@ def _jacobian(
         speeds = np.einsum("rai,rai->ra", axes[group], levers) * _MOVES[parts]
         out[every, group] += sign * speeds
     return out[:, :4].reshape(len(rows), 16)
-
-
-def _axes(pose: Pose, placement: Placement) -> Float64[np.ndarray, "16 3"]:
-    """Each angle's axis in the world."""
-    rows: list[np.ndarray] = []
-    for arm, leg, mirror in (
-        (pose.left_arm, pose.left_leg, np.ones(3)),
-        (pose.right_arm, pose.right_leg, -MIRROR),  # a mirrored rotation turns the other way
-    ):
-        swing = turned(-arm.swing, 0, 0)
-        chain = arm_chain(arm)
-        local = np.array([[-1.0, 0, 0], -swing[:, 1], chain[:, 2], -chain[:, 0]])
-        rows.append((local * mirror) @ placement.chest.T)
-        swing = turned(-leg.hip, 0, 0)
-        chain = leg_chain(leg)
-        local = np.array([[-1.0, 0, 0], -swing[:, 1], chain[:, 2], chain[:, 0]])
-        rows.append((local * mirror) @ placement.upright.T)
-    return np.concatenate(rows)

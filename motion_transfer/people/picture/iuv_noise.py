@@ -11,7 +11,6 @@ that side, as DensePose scales each box to one size.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
@@ -20,19 +19,41 @@ import numpy as np
 from jaxtyping import UInt8
 from scipy.ndimage import find_objects
 
-from motion_transfer.people.picture.iuv_faults import lose_parts, swap_faces, swap_sides
-from motion_transfer.people.picture.smooth_noise import smooth_noise
+from motion_transfer.people.picture.paint import smooth_noise
 
 Iuv = UInt8[np.ndarray, "H W 3"]
 Parts = UInt8[np.ndarray, "H W"]
-Box = tuple[slice, slice]
+Rng = np.random.Generator
+
+ARMS = ((3, 4), (19, 20), (21, 22), (15, 16), (17, 18))
+LEGS = ((5, 6), (11, 12), (13, 14), (7, 8), (9, 10))
+HEAD = ((23, 24),)
+"""Parts and their twins on the other side of the body; the outer ones come first."""
+LOWER_LIMB_PAIRS = 3
+"""So many of them lie beyond elbow or knee."""
+
+FACES = ((1, 2), (7, 9), (8, 10), (11, 13), (12, 14), (15, 17), (16, 18), (19, 21), (20, 22))
+"""The two faces of the torso and of each limb."""
+HANDS = ((3, (20, 22)), (4, (19, 21)))
+"""Each hand, and its forearm."""
+FEET = (5, 6)
+
+# where the twin's chart runs the other way; measured on the charts through `nhrr_core.UVLayout`
+U_TURNS_ACROSS_SIDES = (3, 4, 5, 6, 23, 24)
+U_TURNS_ACROSS_FACES = (7, 8, 9, 10, 11, 12, 13, 14)
+V_TURNS_ACROSS_FACES = (7, 8, 9, 10)
 
 PERSON_PX = 256
+# chosen by eye against real outputs
 SILHOUETTE_WAVE_PX = 22.0  # how far along the border its movements are alike
 PART_WAVE_PX = 18.0
 DRIFT_WAVE_SHARE = 0.2  # of the person's box: U and V drift together over so much of it
+PATCH_SHARE = 0.3  # of the box: a confusion of faces covers a patch about so large
 REACH_PX = 7.0  # borders move less than this
 SEVERITY = (0.5, 1.5)
+CELL_BLUR = 1.73
+"""Taking the mean over each cell of a grid and interpolating between them blurs like a box of so
+many cells."""
 
 
 @dataclass(frozen=True)
@@ -43,19 +64,19 @@ class IuvNoise:
     and 1.5, since some pictures are harder than others.
 
     Attributes:
-        silhouette_px: movement of the person's border.
-        part_border_px: movement of the borders between parts.
-        grid_cells: cells along each side of the person's box that the estimate is made in; 0 for as
+        silhouette_px: Movement of the person's border.
+        part_border_px: Movement of the borders between parts.
+        grid_cells: Cells along each side of the person's box that the estimate is made in; 0 for as
             many as there are pixels.
-        uv_drift: smooth error of U and V within a part, chart units.
-        uv_shift: constant error of U and V in each part, chart units.
-        hand_loss: probability that a hand is missing, for each hand.
-        forearm_loss: probability that the forearm is missing where the hand is.
-        foot_loss: probability that a foot is missing, for each foot.
-        side_swap: probability that left and right are confused, for the arms, legs and head each.
-        face_swap: probability that front and back are confused somewhere on a limb or the torso,
+        uv_drift: Smooth error of U and V within a part, chart units.
+        uv_shift: Constant error of U and V in each part, chart units.
+        hand_loss: Probability that a hand is missing, for each hand.
+        forearm_loss: Probability that the forearm is missing where the hand is.
+        foot_loss: Probability that a foot is missing, for each foot.
+        side_swap: Probability that left and right are confused, for the arms, legs and head each.
+        face_swap: Probability that front and back are confused somewhere on a limb or the torso,
             for each of them.
-        holes: mean number of small holes in a person.
+        holes: Mean number of small holes in a person.
     """
 
     silhouette_px: float = 0.0
@@ -71,15 +92,10 @@ class IuvNoise:
     holes: float = 0.0
 
     @classmethod
-    def none(cls) -> IuvNoise:
-        """No faults."""
-        return cls()
-
-    @classmethod
     def densepose(cls) -> IuvNoise:
-        """As in the estimates that circulate with fashion photos.
+        """Err as the estimates do that circulate with fashion photos.
 
-        DensePose predicts 56 x 56 cells a box and doubles them by interpolation. The rest is
+        DensePose predicts 56 x 56 cells a box and doubles them by interpolation. The rest was
         judged by eye against real outputs.
         """
         return cls(
@@ -97,7 +113,7 @@ class IuvNoise:
         )
 
 
-def add_iuv_noise(iuv: Iuv, noise: IuvNoise, rng: np.random.Generator) -> Iuv:
+def add_iuv_noise(iuv: Iuv, noise: IuvNoise, rng: Rng) -> Iuv:
     """Put faults on a clean IUV.
 
     Returns: a new array; equal to the input where `noise` is all zero or nobody is seen.
@@ -114,6 +130,7 @@ def add_iuv_noise(iuv: Iuv, noise: IuvNoise, rng: np.random.Generator) -> Iuv:
         return out
     x, y, width, height = cv2.boundingRect(part)
     scale = max(width, height) / PERSON_PX
+    # work on the box alone, with room for the border to move by four deviations
     margin = 2 + round(4 * SEVERITY[1] * noise.silhouette_px * scale)
     rows = slice(max(0, y - margin), y + height + margin)
     columns = slice(max(0, x - margin), x + width + margin)
@@ -140,20 +157,87 @@ def add_iuv_noise(iuv: Iuv, noise: IuvNoise, rng: np.random.Generator) -> Iuv:
     return out
 
 
-def _see_coarsely(part: Parts, cells: int, width: int, height: int) -> Parts:
-    """Each pixel's likeliest part after the parts have passed through a grid of cells.
-
-    Taking the mean over each cell and interpolating between cells blurs like a box of 1.73 cells.
+def lose_parts(iuv: Iuv, hand: float, forearm: float, foot: float, rng: Rng) -> Iuv:
+    """Turn hands, forearms and feet into background, each with its probability.
 
     Args:
-        width, height: of the person's box, which the grid is laid over.
+        forearm: Counts only where the hand of that arm is lost.
     """
-    kernel = tuple(1 + 2 * round(0.5 * (1.73 * side / cells - 1)) for side in (width, height))
+    draws = rng.random(6)  # always as many, so that one rate does not shift what others draw
+    lost = [f for f, draw in zip(FEET, draws[:2], strict=True) if draw < foot]
+    for (part, arm), draw, arm_draw in zip(HANDS, draws[2:4], draws[4:], strict=True):
+        if draw < hand:
+            lost += [part, *arm] if arm_draw < forearm else [part]
+    if not lost:
+        return iuv
+    keep = np.ones(256, np.uint8)
+    keep[lost] = 0
+    return iuv * keep[iuv[..., :1]]
+
+
+def swap_sides(iuv: Iuv, probability: float, rng: Rng) -> Iuv:
+    """Take left for right: on the arms, the legs and the head, each with that probability.
+
+    A confused pair trades places, or both are taken for the same side; on limbs, the whole of them
+    or what lies beyond elbow and knee.
+    """
+    becomes = np.arange(256, dtype=np.uint8)
+    for pairs in (ARMS, LEGS, HEAD):
+        chosen, lower, way = rng.random() < probability, rng.random() < 0.5, rng.integers(3)
+        if not chosen:
+            continue
+        for first, second in pairs[:LOWER_LIMB_PAIRS] if lower else pairs:
+            if way != 1:
+                becomes[first] = second
+            if way != 2:
+                becomes[second] = first
+    if (becomes == np.arange(256)).all():
+        return iuv
+    return _renamed(iuv, becomes[iuv[..., 0]], U_TURNS_ACROSS_SIDES, ())
+
+
+def swap_faces(iuv: Iuv, probability: float, rng: Rng) -> Iuv:
+    """Take front for back, in a patch of the torso or of a limb, each with that probability."""
+    draws = rng.random(len(FACES))
+    becomes = np.arange(256, dtype=np.uint8)
+    for (first, second), draw in zip(FACES, draws, strict=True):
+        if draw < probability:
+            becomes[[first, second]] = second, first
+    if not (draws < probability).any():
+        return iuv
+    patch = smooth_noise(iuv.shape, PATCH_SHARE * max(iuv.shape), rng) > rng.uniform(-0.5, 1)
+    part = np.where(patch, becomes[iuv[..., 0]], iuv[..., 0])
+    return _renamed(iuv, part, U_TURNS_ACROSS_FACES, V_TURNS_ACROSS_FACES)
+
+
+def _renamed(iuv: Iuv, part: np.ndarray, u_turns: tuple[int, ...], v_turns: tuple[int, ...]) -> Iuv:
+    """Give an IUV other parts; where one changes, U and V run back in the charts named."""
+    out = iuv.copy()
+    out[..., 0] = part
+    places = np.flatnonzero(part != iuv[..., 0])
+    before, after = iuv.reshape(-1, 3)[places], out.reshape(-1, 3)
+    for channel, turning in ((1, u_turns), (2, v_turns)):
+        turned = np.isin(before[:, 0], turning)
+        after[places[turned], channel] = 255 - before[turned, channel]
+    return out
+
+
+def _see_coarsely(part: Parts, cells: int, width: int, height: int) -> Parts:
+    """Find each pixel's likeliest part after the parts have passed through a grid of cells.
+
+    Args:
+        width, height: The person's box, which the grid is laid over.
+    """
+    kernel = tuple(1 + 2 * round(0.5 * (CELL_BLUR * side / cells - 1)) for side in (width, height))
     if max(kernel) <= 1:
         return part
     best = cv2.blur((part == 0) * np.uint8(255), kernel)
     winner = np.zeros(part.shape, np.uint8)
-    for p, box in _boxes(part, reach=max(kernel) // 2):
+    reach = max(kernel) // 2  # a part counts no further from its own box
+    for p, found in enumerate(find_objects(part, max_label=24), start=1):
+        if found is None:
+            continue
+        box = tuple(slice(max(0, side.start - reach), side.stop + reach) for side in found)
         score = cv2.blur((part[box] == p) * np.uint8(255), kernel)
         better = cv2.compare(score, best[box], cv2.CMP_GT)
         cv2.copyTo(score, better, best[box])
@@ -161,18 +245,8 @@ def _see_coarsely(part: Parts, cells: int, width: int, height: int) -> Parts:
     return winner
 
 
-def _boxes(part: Parts, reach: int = 0) -> Iterator[tuple[int, Box]]:
-    """Each part present and the box that holds it, so many px wider on each side."""
-    for p, box in enumerate(find_objects(part, max_label=24), start=1):
-        if box is not None:
-            rows, columns = (slice(max(0, s.start - reach), s.stop + reach) for s in box)
-            yield p, (rows, columns)
-
-
-def _ragged_part_borders(
-    part: Parts, amplitude_px: float, scale: float, rng: np.random.Generator
-) -> Parts:
-    """Borders between parts moved, the silhouette kept."""
+def _ragged_part_borders(part: Parts, amplitude_px: float, scale: float, rng: Rng) -> Parts:
+    """Move the borders between parts; keep the silhouette."""
     height, width = part.shape
     wave = PART_WAVE_PX * scale
     x = np.arange(width, dtype=np.float32) + amplitude_px * smooth_noise(part.shape, wave, rng)
@@ -183,9 +257,9 @@ def _ragged_part_borders(
 
 
 def _ragged_silhouette(
-    part: Parts, amplitude_px: float, scale: float, rng: np.random.Generator
+    part: Parts, amplitude_px: float, scale: float, rng: Rng
 ) -> tuple[Parts, np.ndarray]:
-    """The silhouette's border moved.
+    """Move the silhouette's border.
 
     Returns: the parts left; and where the person has grown, as flat indices.
     """
@@ -198,7 +272,7 @@ def _ragged_silhouette(
 
 
 def _fill_parts(iuv: Iuv, part: Parts, grown: np.ndarray, reach_px: int) -> Iuv:
-    """The IUV with new parts.
+    """Give an IUV new parts.
 
     A pixel that joins a part takes U and V of that part's nearest pixel; one that joins the person
     takes all of the nearest pixel of the person. Where none is within reach, nothing joins.
@@ -219,7 +293,7 @@ def _fill_parts(iuv: Iuv, part: Parts, grown: np.ndarray, reach_px: int) -> Iuv:
 
 
 def _nearest(image: Parts, places: np.ndarray, wanted: np.ndarray, reach_px: int) -> np.ndarray:
-    """Where near some places (flat indices) an image has the values wanted there.
+    """Find where near some places (flat indices) an image has the values wanted there.
 
     Few places are asked for and most lie close by, so that looking around each in widening
     circles is faster than a distance transform for each part.
@@ -244,14 +318,14 @@ def _nearest(image: Parts, places: np.ndarray, wanted: np.ndarray, reach_px: int
 
 @cache
 def _circles(radius: int) -> tuple[np.ndarray, ...]:
-    """Steps (down, right) within a radius, the shortest first, in batches of growing length."""
+    """List steps (down, right) within a radius, the shortest first, in batches that grow."""
     span = range(-radius, radius + 1)
     steps = [(y, x) for y in span for x in span if 0 < y * y + x * x <= radius * radius]
     steps.sort(key=lambda step: step[0] ** 2 + step[1] ** 2)
     return tuple(np.split(np.array(steps), [4, 20]))
 
 
-def _drift(iuv: Iuv, drift: float, shift: float, rng: np.random.Generator) -> None:
+def _drift(iuv: Iuv, drift: float, shift: float, rng: Rng) -> None:
     """Change U and V of a person in place, differently in each part."""
     part = cv2.extractChannel(iuv, 0)
     wave = DRIFT_WAVE_SHARE * max(part.shape)
@@ -261,14 +335,13 @@ def _drift(iuv: Iuv, drift: float, shift: float, rng: np.random.Generator) -> No
     for channel in (0, 1):
         error = cv2.multiply(cv2.LUT(part, gain[channel]), smooth_noise(part.shape, wave, rng))
         error += cv2.LUT(part, constant[channel])
-        changed = cv2.add(
-            cv2.extractChannel(iuv, channel + 1), error, dtype=cv2.CV_8U
-        )  # rounds and saturates
+        clean = cv2.extractChannel(iuv, channel + 1)
+        changed = cv2.add(clean, error, dtype=cv2.CV_8U)  # rounds and saturates
         cv2.insertChannel(changed, iuv, channel + 1)
 
 
-def _punch_holes(iuv: Iuv, count: float, scale: float, rng: np.random.Generator) -> None:
-    """Small holes, in place."""
+def _punch_holes(iuv: Iuv, count: float, scale: float, rng: Rng) -> None:
+    """Punch small holes, in place."""
     person = np.flatnonzero(iuv[..., 0])
     if len(person) == 0:
         return

@@ -1,12 +1,28 @@
-"""Lamps around a person."""
+"""Lamps around a person, and the shadow that they throw on the floor.
+
+Kinds of light, their shares and strengths were chosen by eye.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from jaxtyping import Float32
+
+from motion_transfer.people.figure.body import Points
+from motion_transfer.people.figure.camera import Camera
 
 Colour = tuple[float, float, float]
+
+CELL_METRES = 0.03
+REACH_METRES = 1.3
+"""The floor's shadow is worked out on cells of such a size, so far from the person to each side."""
+CONTACT_METRES = 0.1
+"""Below this height a body keeps ambient light off the floor as well."""
+LOWEST_LAMP = 0.25
+"""Sine of an elevation; lamps below it cast its shadow, as theirs would run out of the grid."""
 
 
 @dataclass(frozen=True)
@@ -14,10 +30,10 @@ class Lamp:
     """A distant light.
 
     Attributes:
-        azimuth: radians; 0 shines from where a camera at azimuth 0 stands (-y), positive from
+        azimuth: Radians; 0 shines from where a camera at azimuth 0 stands (-y), positive from
             the left hand (+x) of a person who faces that camera.
-        elevation: above the horizon, radians.
-        colour: linear RGB that a white surface facing it returns.
+        elevation: Height above the horizon, radians.
+        colour: Linear RGB that a white surface facing it returns.
     """
 
     azimuth: float
@@ -26,7 +42,7 @@ class Lamp:
 
     @property
     def toward(self) -> Colour:
-        """Unit vector toward the lamp."""
+        """Point toward the lamp, a unit vector."""
         level = np.cos(self.elevation)
         return (
             float(np.sin(self.azimuth) * level),
@@ -41,9 +57,9 @@ class Light:
 
     Attributes:
         lamps: 1 to 3; the first is the key, and the only one that casts a shadow.
-        sky, ground: ambient light from above and from below.
-        softness_metres: how far the edge of the key's shadow is smeared.
-        occlusion: how dark folds and gaps become, 0..1.
+        sky, ground: Ambient light from above and from below.
+        softness_metres: How far the edge of the key's shadow is smeared.
+        occlusion: How dark folds and gaps become, 0..1.
     """
 
     lamps: tuple[Lamp, ...]
@@ -54,12 +70,13 @@ class Light:
 
 
 def sample_light(rng: np.random.Generator) -> Light:
-    """Studio light, window light, sun or an overcast sky, with a white balance near neutral."""
+    """Draw studio light, window light, sun or an overcast sky, their white near neutral."""
     kind = rng.choice(["studio", "window", "sun", "overcast"], p=[0.5, 0.2, 0.15, 0.15])
     warmth = rng.normal(0, 0.035)
+    # harsher light has more of its strength in one lamp
     key_share = {"studio": 0.5, "window": 0.65, "sun": 0.85, "overcast": 0.3}[kind]
     key_share += rng.uniform(-0.1, 0.1)
-    total = rng.uniform(0.98, 1.22)
+    total = rng.uniform(0.98, 1.22)  # of key and sky together
     side = rng.choice([-1.0, 1.0])
     azimuth = side * rng.uniform(0.15, 0.9 if kind == "studio" else 1.25)
     lamps = [Lamp(azimuth, rng.uniform(0.45, 1.05), _tinted(total * key_share, warmth))]
@@ -82,5 +99,48 @@ def sample_light(rng: np.random.Generator) -> Light:
 
 
 def _tinted(amount: float, warmth: float) -> Colour:
-    """An intensity as a colour; warmth > 0 is towards red."""
+    """Make a colour of an intensity; warmth > 0 is towards red."""
     return (amount * (1 + warmth), amount, amount * (1 - warmth))
+
+
+def floor_shadow(points: Points, camera: Camera, light: Light) -> Float32[np.ndarray, "H W"]:
+    """Find the share of the floor's light that a body on z = 0 takes away, seen by a camera.
+
+    The body's vertices are dropped along the key lamp's rays (and, near the floor, straight down)
+    into a grid on the floor, and blurred; a homography takes the grid to the picture.
+    """
+    lamp = light.lamps[0]
+    x, y, z = lamp.toward
+    fallen = points[:, :2] - points[:, 2:] * (np.array([x, y], np.float32) / max(z, LOWEST_LAMP))
+    middle = points[:, :2].mean(0)
+    cells = round(2 * REACH_METRES / CELL_METRES)
+    low = points[:, 2] < CONTACT_METRES
+    cast = _grid(fallen - middle, cells, 0.03 + 2 * light.softness_metres)
+    contact = _grid(points[low, :2] - middle, cells, 0.03)
+    share = sum(lamp.colour) / (sum(lamp.colour) + sum(light.sky))
+    ring = np.linspace(-1, 1, cells, dtype=np.float32)
+    fade = np.clip(1.5 * (1 - np.hypot(ring, ring[:, None])), 0, 1)  # no edge where the grid ends
+    # neither takes all: some light comes back from the room
+    taken = 1 - (1 - 0.9 * share * cast * fade) * (1 - 0.75 * contact)
+
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32) * REACH_METRES
+    corners[:, :2] += middle
+    seen = camera.project(corners)[:, :2]
+    square = np.array([[0, 0], [cells, 0], [cells, cells], [0, cells]], np.float32)
+    to_picture = cv2.getPerspectiveTransform(square, seen.astype(np.float32))
+    return cv2.warpPerspective(
+        taken.astype(np.float32), to_picture, (camera.width, camera.height), flags=cv2.INTER_LINEAR
+    )
+
+
+def _grid(
+    places: Float32[np.ndarray, "N 2"], cells: int, blur_metres: float
+) -> Float32[np.ndarray, "cells cells"]:
+    """Measure how densely places (metres from the middle) cover the grid's cells, 0..1."""
+    index = ((places + REACH_METRES) / CELL_METRES).astype(np.int32)
+    inside = ((index >= 0) & (index < cells)).all(1)
+    flat = index[inside, 1] * cells + index[inside, 0]
+    count = np.bincount(flat, minlength=cells * cells).reshape(cells, cells).astype(np.float32)
+    # vertices lie further apart than cells in places
+    filled = cv2.dilate(np.minimum(count, 1), np.ones((3, 3), np.uint8))
+    return np.clip(cv2.GaussianBlur(filled, (0, 0), blur_metres / CELL_METRES), 0, 1)

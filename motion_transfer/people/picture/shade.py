@@ -1,4 +1,4 @@
-"""What a surface looks like under a light: albedo, relief, highlights, shadows, occlusion."""
+"""From pieces under a light to a photo's bytes: relief, highlights, shadows, occlusion, tone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import warp as wp
-from jaxtyping import Bool, Float32, UInt64
+from jaxtyping import Bool, Float32, UInt8, UInt64
 
 from motion_transfer.people.figure.body import Points
 from motion_transfer.people.figure.camera import Camera
@@ -27,6 +27,7 @@ from motion_transfer.people.picture.shade_kernels import (
     LightInput,
     MaterialInput,
     add_normals,
+    develop_pixels,
     shade_samples,
 )
 
@@ -34,12 +35,20 @@ SAMPLES = 2
 """Samples along each side of a pixel."""
 
 SHADOW_SIZE = 192
+"""Pixels along each side of the shadow map."""
+
 LAMP_DISTANCE_METRES = 1000.0
 """The rasteriser interpolates as a perspective does; from this far it is as good as parallel."""
 
 OCCLUSION_RADII_METRES = (0.03, 0.12)
+"""Folds of cloth, and gaps between limbs."""
+
 OCCLUSION_THRESHOLD = 0.12
 """A round surface is a little behind its own neighbourhood; that is no occlusion."""
+
+TONE_RANGE = 2.0
+KNEE = 0.8
+"""Linear light above this is compressed: it comes close to white at TONE_RANGE."""
 
 
 @dataclass(frozen=True)
@@ -47,19 +56,14 @@ class Shading:
     """Pieces seen by a camera.
 
     Attributes:
-        rgba: H x W x 4: linear RGB multiplied by the coverage, and the coverage.
+        rgba: Linear RGB multiplied by the coverage, and the coverage.
     """
 
     rgba: Float32[np.ndarray, "H W 4"]
 
     @property
-    def colour(self) -> Float32[np.ndarray, "H W 3"]:
-        """Linear RGB, multiplied by the coverage."""
-        return self.rgba[..., :3]
-
-    @property
     def coverage(self) -> Float32[np.ndarray, "H W"]:
-        """Share of each pixel that the person covers, in steps of 1 / SAMPLES^2."""
+        """Tell the share of each pixel that the person covers, in steps of 1 / SAMPLES^2."""
         return self.rgba[..., 3]
 
 
@@ -67,19 +71,18 @@ class Scene:
     """Pieces joined, once for any number of pictures of them.
 
     Attributes:
-        triangles: of all pieces, vertices and faces numbered through.
+        triangles: All pieces' triangles, vertices and faces numbered through.
     """
 
     def __init__(self, pieces: Sequence[Piece]) -> None:
-        counts = [len(piece.points) for piece in pieces]
-        first = np.cumsum([0, *counts], dtype=np.int32)
+        faces = [len(piece.faces) for piece in pieces]
+        first = np.cumsum([0, *(len(piece.points) for piece in pieces)], dtype=np.int32)
         self.triangles = Triangles(
             np.concatenate([piece.faces + n for piece, n in zip(pieces, first, strict=False)]),
             np.concatenate([piece.keep for piece in pieces]).astype(np.float32),
-            np.repeat([not piece.two_sided for piece in pieces], faces := _faces(pieces)).astype(
-                np.uint8
-            ),
+            np.repeat(np.array([not piece.two_sided for piece in pieces], np.uint8), faces),
         )
+        # kernels take no lists: texels of all textures lie one after the other
         textures = [piece.material.texture.reshape(-1, 4) for piece in pieces]
         texels = np.cumsum([0, *(len(texture) for texture in textures)])
         materials = [_material(p, int(n)) for p, n in zip(pieces, texels, strict=False)]
@@ -94,13 +97,14 @@ class Scene:
         """Draw the pieces; without a light, each shows its bare colour.
 
         Args:
-            points: of all pieces in their order, posed.
+            points: All pieces' points in their order, posed.
         """
         fine = camera.scaled(SAMPLES)
         screen = fine.project(points)
         nearest = rasterise(screen, self.triangles, fine.width, fine.height)
         shadow_map, lamp = _light_input(light, camera, self.triangles, points)
         seen = np.not_equal(nearest, EMPTY)
+        # only samples at which something is seen are shaded
         share = sample_shares(seen.reshape(fine.height, fine.width))
         sample = np.flatnonzero(share).astype(np.int32)
         out = wp.zeros((camera.height, camera.width), dtype=wp.vec4, device="cpu")
@@ -123,7 +127,7 @@ class Scene:
 
 
 def sample_shares(seen: Bool[np.ndarray, "SH SW"]) -> Float32[np.ndarray, " SH*SW"]:
-    """How much each sample counts for its pixel.
+    """Weigh how much each sample counts for its pixel.
 
     Samples of a pixel count alike, so that the outline is as fine as they are; but inside a person
     those on the diagonal do for all, which halves the work.
@@ -137,15 +141,11 @@ def sample_shares(seen: Bool[np.ndarray, "SH SW"]) -> Float32[np.ndarray, " SH*S
 
 
 def vertex_normals(points: Points, triangles: Triangles) -> Float32[np.ndarray, "V 3"]:
-    """Sums of the normals of the triangles around each vertex, weighted by area; not unit."""
+    """Add up the normals of the triangles around each vertex, weighted by area; not unit."""
     normals = wp.zeros(len(points), dtype=wp.vec3, device="cpu")
     inputs = [share_array(points, wp.vec3), triangles.arrays[0]]
     wp.launch(add_normals, len(triangles.faces), inputs=inputs, outputs=[normals], device="cpu")
     return normals.numpy()
-
-
-def _faces(pieces: Sequence[Piece]) -> list[int]:
-    return [len(piece.faces) for piece in pieces]
 
 
 def _material(piece: Piece, first_texel: int) -> Any:
@@ -164,13 +164,13 @@ def _material(piece: Piece, first_texel: int) -> Any:
 def _light_input(
     light: Light | None, camera: Camera, triangles: Triangles, points: Points
 ) -> tuple[Float32[np.ndarray, "S S"], Any]:
-    """The shadow map (depth from the key lamp) and everything that shading needs of the light."""
+    """Make the shadow map (depth from the key lamp), and all that shading needs of the light."""
     made = LightInput()
     made.camera = wp.vec3(*camera.position)
     made.lit = int(light is not None)
     if light is None:
         return np.zeros((1, 1), np.float32), made
-    black = (0.0, 0.0, 0.0)
+    black = (0.0, 0.0, 0.0)  # kernels take three lamps, whether they are lit or not
     lamps = [*light.lamps, *[None] * 3][:3]
     made.toward = wp.mat33(*[x for lamp in lamps for x in (lamp.toward if lamp else black)])
     made.colour = wp.mat33(*[x for lamp in lamps for x in (lamp.colour if lamp else black)])
@@ -182,16 +182,17 @@ def _light_input(
     made.softness_px = light.softness_metres * float(np.linalg.norm(rows[0, :3]))
     placed = points @ rows[:, :3].T + rows[:, 3]
     seen = rasterise(placed, triangles, SHADOW_SIZE, SHADOW_SIZE)
-    shadow = np.where(seen == EMPTY, np.float32(1e9), depths(seen))
+    shadow = np.where(seen == EMPTY, np.float32(1e9), depths(seen))  # nothing is in the way
     return shadow.reshape(SHADOW_SIZE, SHADOW_SIZE), made
 
 
 def shadow_rows(light: Light, points: Points) -> Float32[np.ndarray, "3 4"]:
-    """Rows that take (x, y, z, 1) to shadow-map column, row and depth from the key lamp."""
+    """Find rows that take (x, y, z, 1) to shadow-map column, row and depth from the key lamp."""
     into = -np.array(light.lamps[0].toward)
     right = np.cross([0.0, 0.0, 1.0], into)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(into, right), into])
+    # one vertex in eight of a person is enough to find the borders, with 6 % to spare
     placed = points[:: 8 if len(points) > 1000 else 1] @ axes.T
     low, high = placed.min(0), placed.max(0)
     scale = 0.94 * SHADOW_SIZE / max(float((high - low)[:2].max()), 1e-3)
@@ -206,7 +207,7 @@ def shadow_rows(light: Light, points: Points) -> Float32[np.ndarray, "3 4"]:
 def _openness(
     nearest: UInt64[np.ndarray, " N"], fine: Camera, light: Light | None
 ) -> Float32[np.ndarray, "H W"]:
-    """How freely light reaches each pixel, 0..1: less where the neighbourhood is nearer.
+    """Tell how freely light reaches each pixel, 0..1: less where the neighbourhood is nearer.
 
     Source: T. Luft, C. Colditz, O. Deussen, "Image enhancement by unsharp masking the depth
     buffer", SIGGRAPH 2006; here at two scales.
@@ -214,12 +215,12 @@ def _openness(
     size = (fine.height // SAMPLES, fine.width // SAMPLES)
     if light is None:
         return np.ones(size, np.float32)
-    grid = nearest.reshape(fine.height, fine.width)[
-        SAMPLES // 2 :: SAMPLES, SAMPLES // 2 :: SAMPLES
-    ]
+    one_a_pixel = slice(SAMPLES // 2, None, SAMPLES)
+    grid = nearest.reshape(fine.height, fine.width)[one_a_pixel, one_a_pixel]
     seen = (grid != EMPTY).astype(np.float32)
     depth = np.where(grid != EMPTY, depths(grid), np.float32(0))
     openness = np.ones(size, np.float32)
+    # shares by eye: gaps should be seen, and no outline around a limb before the body
     metre_px = fine.focal_px / SAMPLES / fine.distance
     for radius in OCCLUSION_RADII_METRES:
         around = _blur(depth, radius * metre_px) / np.maximum(_blur(seen, radius * metre_px), 1e-3)
@@ -229,11 +230,48 @@ def _openness(
 
 
 def _blur(image: Float32[np.ndarray, "H W"], sigma: float) -> Float32[np.ndarray, "H W"]:
-    """A Gaussian blur, on a coarser grid where it is wide."""
-    step = max(1, int(sigma / 1.3))
+    """Blur by a Gaussian, on a coarser grid where it is wide."""
+    step = max(1, int(sigma / 1.3))  # a narrower blur would not hide the coarser grid
     if step == 1:
         return cv2.GaussianBlur(image, (0, 0), max(sigma, 0.6))
     height, width = image.shape
     coarse = cv2.resize(image, (width // step, height // step), interpolation=cv2.INTER_AREA)
     coarse = cv2.GaussianBlur(coarse, (0, 0), sigma / step)
     return cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
+
+
+def develop(
+    seen: Shading, behind: Float32[np.ndarray, "H W 3"], grain: float, rng: np.random.Generator
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Put the person in front of a background, as 8-bit sRGB.
+
+    Args:
+        behind: Linear RGB.
+        grain: Sensor noise, standard deviation as a share of white.
+    """
+    height, width = behind.shape[:2]
+    noise = np.zeros((1, 1), np.float32)
+    if grain > 0:
+        noise = rng.standard_normal((height, width), np.float32) * np.float32(255 * grain)
+    rgb = np.empty((height, width, 3), np.uint8)
+    inputs = [
+        share_array(seen.rgba, wp.vec4),
+        share_array(behind, wp.vec3),
+        share_array(noise, wp.float32),
+        share_array(_TONE, wp.float32),
+        TONE_RANGE,
+    ]
+    outputs = [share_array(rgb, wp.uint8)]
+    wp.launch(develop_pixels, (height, width), inputs=inputs, outputs=outputs, device="cpu")
+    return rgb
+
+
+def _tone_curve() -> Float32[np.ndarray, " N"]:
+    """Tabulate the sRGB value (0..255) of linear light from 0 to TONE_RANGE."""
+    light = np.linspace(0, TONE_RANGE, 8192)  # fine enough for 8 bits where sRGB is steepest
+    bent = np.where(light < KNEE, light, 1 - (1 - KNEE) * np.exp(-(light - KNEE) / (1 - KNEE)))
+    encoded = np.where(bent <= 0.0031308, 12.92 * bent, 1.055 * bent ** (1 / 2.4) - 0.055)
+    return (255 * encoded).astype(np.float32)
+
+
+_TONE = _tone_curve()

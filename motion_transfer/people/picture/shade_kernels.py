@@ -1,15 +1,21 @@
-"""What `Scene` runs for each sample, compiled by `warp`; types are warp's, not Python's."""
+"""What `Scene` and `develop` run for each sample and pixel.
+
+`warp` compiles it; types are warp's, not Python's. Distances were chosen by eye.
+"""
 
 import numpy as np
 import warp as wp
 
-from motion_transfer.people.extra import start_warp
+from motion_transfer.people.figure.body import start_warp
 from motion_transfer.people.figure.raster_kernels import perspective_weights
 
 start_warp()
 
 SHADOW_BIAS_METRES = 0.012
+"""A point looks for the lamp from so far off its surface: the shadow map's cells are as coarse."""
+
 SCATTER_METRES = 0.1
+"""How far light would get through wholly translucent flesh."""
 
 WRAP_TINT = wp.constant(wp.vec3(1.0, 0.55, 0.4))
 """Light that wraps around skin has passed through it, and comes out red."""
@@ -36,6 +42,8 @@ SPINS = wp.constant(
 
 @wp.struct
 class LightInput:
+    """A `Light` and the camera, as kernels read them."""
+
     toward: wp.mat33  # rows: unit vectors toward the lamps
     colour: wp.mat33  # rows
     lamps: wp.int32
@@ -51,6 +59,8 @@ class LightInput:
 
 @wp.struct
 class MaterialInput:
+    """A `Material`, whose texels begin at `first_texel` of all textures."""
+
     first_texel: wp.int32
     height: wp.int32
     width: wp.int32
@@ -68,6 +78,7 @@ def add_normals(
     faces: wp.array(dtype=wp.vec3i),
     normals: wp.array(dtype=wp.vec3),
 ):
+    """Add each triangle's normal, as long as twice its area, to its corners'."""
     corners = faces[wp.tid()]
     a = points[corners[0]]
     n = wp.cross(points[corners[1]] - a, points[corners[2]] - a)
@@ -78,7 +89,7 @@ def add_normals(
 
 @wp.func
 def _texel(texture: wp.array(dtype=wp.vec4), material: MaterialInput, u: float, v: float):
-    """Bilinear; repeats along u, clamps along v."""
+    """Look up a texture, bilinear; it repeats along u and is clamped along v."""
     height, width = material.height, material.width
     x = (u - wp.floor(u)) * float(width) - 0.5
     y = wp.clamp(v * float(height) - 0.5, 0.0, float(height - 1))
@@ -98,7 +109,7 @@ def _texel(texture: wp.array(dtype=wp.vec4), material: MaterialInput, u: float, 
 
 @wp.func
 def _key_share(light: LightInput, shadow: wp.array2d(dtype=wp.float32), point: wp.vec3, spin: int):
-    """How much of the key lamp a point sees, from 8 places of a disc in the shadow map."""
+    """Find how much of the key lamp a point sees, at 8 places of a disc in the shadow map."""
     p = wp.vec4(point[0], point[1], point[2], 1.0)
     x, y, z = wp.dot(light.shadow_x, p), wp.dot(light.shadow_y, p), wp.dot(light.shadow_z, p)
     cosine, sine = light.softness_px * SPINS[spin, 0], light.softness_px * SPINS[spin, 1]
@@ -123,7 +134,8 @@ def _lit(
     material: MaterialInput,
     light: LightInput,
 ):
-    """What a surface sends to the camera: `key` of the first lamp and `open_share` of the rest."""
+    """Find what a surface sends on: `key` of the first lamp, `open_share` of all other light."""
+    # a hemisphere of sky above one of ground, mixed by how far up the surface looks
     upward = 0.5 + 0.5 * normal[2]
     incoming = (light.ground * (1.0 - upward) + light.sky * upward) * open_share
     highlight = wp.vec3(0.0, 0.0, 0.0)
@@ -144,9 +156,10 @@ def _lit(
         if material.gloss > 0.0 and cosine > -0.2:
             half = wp.normalize(toward + view)
             shine = wp.max(wp.dot(normal, half), 0.0)
-            if material.sheen_along_v != 0:
+            if material.sheen_along_v != 0:  # strands shine all around themselves
                 across = wp.dot(along_v, half)
                 shine = wp.sqrt(wp.max(1.0 - across * across, 0.0))
+            # fades where the lamp sets, so that the highlight has no edge
             strength = material.gloss * seen * wp.clamp(cosine * 3.0 + 0.6, 0.0, 1.0)
             highlight += light.colour[k] * (strength * wp.pow(shine, material.sharpness))
     return wp.cw_mul(albedo, incoming) + highlight
@@ -171,6 +184,7 @@ def shade_samples(
     samples: wp.int32,
     colour: wp.array2d(dtype=wp.vec4),
 ):
+    """Shade one sample and add it, weighted by its share, to its pixel."""
     i = wp.tid()
     face = seen_face[i]
     width = colour.shape[1] * samples

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from motion_transfer.batch.expand import Job, check_inputs, expand
-from motion_transfer.batch.manifest import JobEntry, schema
-from motion_transfer.batch.manifest_file import ManifestError, read_manifest
-from motion_transfer.render.option import list_options
-from motion_transfer.render.options import CHANNEL_ORDERS, RenderOptions
+from motion_transfer.batch.manifest import JobEntry, ManifestError, read_manifest, schema
+from motion_transfer.media.iuv.formats import CHANNEL_ORDERS
+from motion_transfer.option import list_options
+from motion_transfer.render.options import RenderOptions
 
 JOBS = Path(__file__).parents[3] / "jobs"
 BATCH_WIDE = {"workers", "restart"}
@@ -46,9 +46,8 @@ def test_jobs_take_exactly_the_options_of_a_run() -> None:
 
 
 def test_the_options_know_the_channel_orders() -> None:
-    from motion_transfer.media import iuv_image
-
-    assert iuv_image.CHANNEL_ORDERS == CHANNEL_ORDERS
+    orders = [e.choices for e in list_options(RenderOptions) if e.name.endswith("iuv_order")]
+    assert orders == [CHANNEL_ORDERS, CHANNEL_ORDERS]
 
 
 def test_three_syntaxes_mean_the_same(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import yaml
 
 from motion_transfer.batch import events, tasks
 from motion_transfer.batch.report import write_report
-from motion_transfer.batch.run import Batch, read_batch, status
+from motion_transfer.batch.run import Batch, count_jobs, read_batch
 from motion_transfer.batch.schedule import Scheduler, Tally
 from motion_transfer.batch.signals import Signals
 from motion_transfer.media.work import work_path
@@ -127,15 +127,15 @@ def walk(studio) -> Path:
 def test_twenty_jobs_of_a_source_compute_one_feature_map(
     studio, run, walk, checkpoint, monkeypatch
 ) -> None:
-    from motion_transfer.render import neural_renderer
+    from motion_transfer.drawing.renderers import network
 
-    encode, encoded = neural_renderer.encode_source, []
+    encode, encoded = network.encode_source, []
 
     def count(*arguments: Any) -> Any:
         encoded.append(arguments)
         return encode(*arguments)
 
-    monkeypatch.setattr(neural_renderer, "encode_source", count)
+    monkeypatch.setattr(network, "encode_source", count)
     studio.array(4, name="wave.npy")
     jobs = [
         job(f"{index}.png", driver=("walk.npy", "wave.npy")[index % 2], frames=str(index % 3))
@@ -152,7 +152,7 @@ def test_jobs_of_a_driver_share_its_scan(studio, run, walk) -> None:
     studio.source("ben")
     result = run(*(job(f"{name}.mp4", source=f"{name}.png") for name in ("anna", "ben")))
     assert len(result.done) == 2
-    assert (result.workers.calls["scan"], result.workers.calls["look"]) == (1, 2)
+    assert (result.workers.calls["scan"], result.workers.calls["encode"]) == (1, 2)
 
 
 def test_higher_priorities_come_first(run, walk) -> None:
@@ -349,7 +349,7 @@ def test_status_and_clean(studio, run, walk, mt) -> None:
     result = run(*jobs, job("half.mp4"), before=break_assembly)
     manifest, root = studio.folder / "shoot.yaml", studio.folder / "out"
     assert work_path(root / "half.mp4").exists()
-    assert status(result.batch) == {"done": 2, "failed": 2, "to do": 0}
+    assert count_jobs(result.batch) == {"done": 2, "failed": 2, "to do": 0}
     (root / "b.png").unlink()
     told = mt("batch", "status", manifest).out.splitlines()
     assert told[0] == "1 done, 2 failed, 1 to do"

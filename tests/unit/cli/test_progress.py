@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from motion_transfer.cli.progress import JsonPrinter, Reporter, choose_listener
-from motion_transfer.render.events import Event, Finished, FramesDone, Notice, Stage, Started
+from motion_transfer.batch import events
+from motion_transfer.cli.batch import _reporter
+from motion_transfer.cli.progress import CountBar, JsonPrinter, Reporter, choose_listener
+from motion_transfer.events import Event, Finished, FramesDone, Notice, Stage, Started
 
 FINISHED = Finished(Path("out.mp4"), 60, 2.0, "texture", 4.0, 3.0)
 STORY: list[Event] = [
@@ -60,3 +62,30 @@ def test_the_bar_goes_away(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "reading driver" in terminal.getvalue()
     assert "rendering" in terminal.getvalue()
     assert terminal.getvalue().split("\r")[-1] == ""
+
+
+def test_a_batch_says_what_failed_even_if_it_is_to_be_quiet(capsys: pytest.CaptureFixture) -> None:
+    story = [
+        events.BatchStarted(2, 1),
+        events.JobPlanned("a.mp4", 3, 0),
+        events.JobFrames("a.mp4", 3),
+        events.JobNotice("a.mp4", "nobody found"),
+        events.JobDone("a.mp4", Path("out/a.mp4"), 3, 1.5),
+        events.JobFailed("b.mp4", "it is gone"),
+        events.BatchFinished(1, 0, 1, 0, 2.0, 1),
+    ]
+    failed = "mt: failed: b.mp4: it is gone\n"
+    for quiet, out, err in (
+        (
+            False,
+            "wrote out/a.mp4: 3 frames (2 frames/s)\n"
+            "1 done, 0 up to date, 1 failed, 0 left; 2.0 s, 1 sources prepared\n",
+            f"mt: note: a.mp4: nobody found\n{failed}",
+        ),
+        (True, "", failed),
+    ):
+        with CountBar("", unit="frame", quiet=quiet) as bar:
+            listener = _reporter(bar, quiet=quiet)
+            for event in story:
+                listener(event)
+        assert capsys.readouterr() == (out, err)

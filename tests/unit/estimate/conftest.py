@@ -6,10 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-
-from motion_transfer.errors import InputError
-from motion_transfer.estimate.extra import require_estimate
-from motion_transfer.estimate.model_files import MODEL_FILES, find_model
+from estimate_stubs import find_models
 
 REFERENCE = Path(__file__).parents[2] / "reference/blazepose_landmarks.json"
 
@@ -17,11 +14,7 @@ REFERENCE = Path(__file__).parents[2] / "reference/blazepose_landmarks.json"
 @pytest.fixture(scope="session")
 def models() -> dict[str, Path]:
     """The two model files by name."""
-    try:
-        require_estimate()
-        return {file.name: find_model(file) for file in MODEL_FILES}
-    except InputError as error:
-        pytest.skip(str(error))
+    return find_models()
 
 
 @pytest.fixture(scope="session")

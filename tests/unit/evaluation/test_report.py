@@ -1,19 +1,32 @@
-"""Results files and tables."""
+"""Protocols, summaries, results files and tables."""
 
 from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from motion_transfer.errors import InputError
 from motion_transfer.evaluation.measures import Column
-from motion_transfer.evaluation.protocol import Protocol
-from motion_transfer.evaluation.report import Method, Results, compare, read_results, table
-from motion_transfer.evaluation.summary import Summary
+from motion_transfer.evaluation.report import (
+    Method,
+    Protocol,
+    Results,
+    Summary,
+    compare,
+    package_versions,
+    read_results,
+    scores_csv,
+    summarise,
+    table,
+)
+from motion_transfer.evaluation.scoring import PairScores
+from motion_transfer.training.pairs import Pair
+from motion_transfer.training.pictures import PhotoFile
 
 COLUMNS = (Column("ssim", "higher", 3, "SSIM"), Column("l1", "lower", 2, "l1"))
 PROTOCOL = Protocol(
@@ -26,8 +39,19 @@ PROTOCOL = Protocol(
     pairs_count=9,
     pairs_sha256="ab",
     metrics={column.name: column.definition for column in COLUMNS},
-    packages={},
+    packages={"torch": "2.13"},
 )
+CHANGES = {
+    "resolution": "512x512",
+    "resize_filter": "nearest",
+    "padding": "black",
+    "background": "photo",
+    "mask": "none",
+    "pairs_count": 3,
+    "pairs_sha256": "cd34",
+    "metrics": {"ssim": "another SSIM", "l1": "l1"},
+    "packages": {"torch": "2.14"},
+}
 
 
 def method(label: str, ssim: float, l1: float, kind: str = "results") -> Method:
@@ -44,6 +68,90 @@ def write(folder: Path, name: str, results: Results = RESULTS) -> Path:
     return path
 
 
+# --- protocols: whatever changes a number makes a difference, and it is named
+
+
+def test_equal_protocols_have_no_differences() -> None:
+    same = replace(PROTOCOL)
+    assert same == PROTOCOL
+    assert PROTOCOL.differences(same) == []
+    assert Protocol.from_dict(asdict(PROTOCOL)) == PROTOCOL
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_every_field_counts_and_is_named(name: str) -> None:
+    other = replace(PROTOCOL, **{name: CHANGES[name]})
+    assert other != PROTOCOL
+    (line,) = PROTOCOL.differences(other)
+    assert line.startswith(name)
+    assert " / " in line
+
+
+def test_the_table_of_changes_is_complete() -> None:
+    assert {item.name for item in fields(Protocol)} == {*CHANGES, "pairs_name"}
+    assert replace(PROTOCOL, pairs_name="other.csv").differences(PROTOCOL) == []
+
+
+def test_other_weights_are_a_difference_and_missing_metrics_are_none() -> None:
+    other = replace(PROTOCOL, metrics={"l1": "weights 2", "fid": "weights 3"})
+    assert PROTOCOL.differences(other) == ["metrics.l1: l1 / weights 2"]
+    assert PROTOCOL.differences(replace(PROTOCOL, metrics={"fid": "weights 3"})) == []
+
+
+def test_what_is_no_protocol() -> None:
+    values = asdict(PROTOCOL)
+    with pytest.raises(InputError, match="lacks, or should not have, mask, masks"):
+        Protocol.from_dict({**{k: v for k, v in values.items() if k != "mask"}, "masks": ""})
+    with pytest.raises(InputError, match="are not tables"):
+        Protocol.from_dict({**values, "metrics": "ssim"})
+
+
+def test_package_versions_leave_patches_out() -> None:
+    import torch
+
+    found = package_versions(("torch", "no-such-package"))
+    assert found["no-such-package"] == "unknown"
+    assert torch.__version__.startswith(found["torch"] + ".")
+    assert found["torch"].count(".") == 1
+
+
+# --- summaries: means and their errors
+
+
+def test_independent_pairs_have_the_usual_error() -> None:
+    values = np.random.default_rng(0).normal(size=20)
+    found = summarise(list(values), [str(n) for n in range(20)])
+    assert found.mean == pytest.approx(values.mean())
+    assert found.median == pytest.approx(np.median(values))
+    assert found.standard_error == pytest.approx(values.std(ddof=1) / math.sqrt(20))
+    assert found.count == 20
+
+
+def test_repeating_a_pair_adds_no_certainty() -> None:
+    values = np.random.default_rng(0).normal(size=10)
+    groups = [str(n) for n in range(10)]
+    once = summarise(list(values), groups)
+    thrice = summarise(list(values) * 3, groups * 3)
+    assert thrice.standard_error == pytest.approx(once.standard_error)
+
+
+def test_pairs_without_the_number_are_left_out() -> None:
+    found = summarise([1.0, math.nan, 3.0], ["a", "b", "c"])
+    assert (found.mean, found.median, found.count) == (2, 2, 2)
+    nothing = summarise([math.nan], ["a"])
+    assert math.isnan(nothing.mean)
+    assert (nothing.median, nothing.standard_error, nothing.count) == (None, None, 0)
+
+
+def test_where_the_error_cannot_be_told() -> None:
+    assert summarise([1.0, 2.0], ["a", "a"]) == Summary(1.5, 1.5, None, 2)
+    found = summarise([1.0, math.inf], ["a", "b"])
+    assert (found.mean, found.standard_error) == (math.inf, None)
+
+
+# --- files
+
+
 def test_a_results_file_reads_back(tmp_path: Path) -> None:
     found = read_results(write(tmp_path, "results.json"))
     assert found == RESULTS
@@ -58,6 +166,19 @@ def test_numbers_that_json_lacks_survive(tmp_path: Path) -> None:
     scores = read_results(path).methods[0].scores
     assert scores["ssim"].mean == math.inf
     assert math.isnan(scores["l1"].mean)
+
+
+def test_a_line_for_each_pair_and_method(tmp_path: Path) -> None:
+    pair = Pair(PhotoFile("a.png", tmp_path), PhotoFile("b, c.png", tmp_path), group="a")
+    scores = [{"ssim": 0.1, "l1": math.nan}, {"ssim": math.inf, "l1": 1 / 3}]
+    assert scores_csv([PairScores(pair, scores, [])], COLUMNS, ["x", "y"]).splitlines() == [
+        "source,target,method,ssim,l1",
+        'a.png,"b, c.png",x,0.1,',
+        'a.png,"b, c.png",y,inf,0.3333333333333333',
+    ]
+
+
+# --- tables
 
 
 def test_the_table_marks_the_best_as_printed() -> None:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from motion_transfer.errors import InputError, RenderError
-from motion_transfer.evaluation.candidates import OpenedSource, TargetCandidate, make_labels_unique
-from motion_transfer.evaluation.choice import Measures
+from motion_transfer.errors import RenderError
+from motion_transfer.evaluation.candidates import OpenedSource, TargetCandidate
 from motion_transfer.evaluation.framing import Framing
-from motion_transfer.evaluation.measures import FlickerMeasure, l1_measure
+from motion_transfer.evaluation.measures import (
+    Column,
+    FlickerMeasure,
+    Measures,
+    SetMeasure,
+    l1_measure,
+)
+from motion_transfer.evaluation.report import Summary, summarise_methods
 from motion_transfer.evaluation.scoring import Scorer
 from motion_transfer.training.pairs import Pair, PairList
 from motion_transfer.training.pictures import PersonPicture
@@ -89,11 +95,34 @@ def test_scores_come_in_order_and_sources_are_opened_once(
 
 
 def test_flicker_is_measured_between_consecutive_frames_only(pairs: PairList) -> None:
-    measures = Measures((), flicker=FlickerMeasure())
+    measures = Measures((FlickerMeasure(),))
     with Scorer([Darker()], measures, FRAMING, workers=2) as scorer:
         scored = scorer.score(pairs)
-    found = [entry.scores[0].get("flicker") for entry in scored]
-    assert found == [None, pytest.approx(1), None, pytest.approx(1)] * 3
+    found = [entry.scores[0]["flicker"] for entry in scored]
+    assert found == pytest.approx([math.nan, 1, math.nan, 1] * 3, nan_ok=True)
+
+
+class Brightness(SetMeasure):
+    """Keeps how bright pictures are; the distance is that of the means."""
+
+    columns = (Column("brightness", "lower", 1, "means"),)
+
+    def features(self, images) -> list[np.ndarray]:
+        return [np.array([image.mean()]) for image in images]
+
+    def distance(self, results, targets) -> float:
+        return float(abs(np.mean(results) - np.mean(targets)))
+
+
+def test_a_measure_of_sets_sees_all_results_and_all_targets(pairs: PairList) -> None:
+    measures = Measures((l1_measure(), Brightness()))
+    candidates = [Darker(), TargetCandidate()]
+    with Scorer(candidates, measures, FRAMING, workers=2) as scorer:
+        scored = scorer.score(pairs)
+    darker, real = summarise_methods(candidates, measures, scored)
+    assert list(darker.scores) == ["l1", "l1-masked", "brightness"]
+    assert darker.scores["brightness"] == Summary(pytest.approx(2.5), None, None, 12)
+    assert real.scores["brightness"].mean == 0
 
 
 def test_a_failure_names_candidate_and_pair(studio) -> None:
@@ -105,23 +134,6 @@ def test_a_failure_names_candidate_and_pair(studio) -> None:
         pytest.raises(RenderError, match="darker failed on a__bad: out of memory"),
     ):
         scorer.score(PairList("painted", made, ""))
-
-
-def test_labels_become_unique() -> None:
-    candidates = [Darker(), Darker(), Darker()]
-    candidates[2].label = "other"
-    make_labels_unique(candidates, [Path("x/w.st"), Path("y/w.st"), Path("z")])
-    assert [candidate.label for candidate in candidates] == ["x/darker", "y/darker", "other"]
-    with pytest.raises(InputError, match=r"x/w\.st is given twice"):
-        make_labels_unique(candidates, [Path("x/w.st"), Path("z/../x/w.st"), Path("z")])
-
-
-def test_a_source_is_unfolded_once_for_each_size(studio) -> None:
-    opened = OpenedSource(Painted(studio, "a").load())
-    first = opened.prepare(64)
-    assert first.texture.shape[-1] == 64
-    assert opened.prepare(64) is first
-    assert opened.prepare(32).texture.shape[-1] == 32
 
 
 def test_pictures_are_drawn_again_in_any_order(pairs: PairList) -> None:

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from motion_transfer.errors import OutputError
-from motion_transfer.media.journal import Journal
-from motion_transfer.media.work import WorkFolder, digest_of, was_published, work_path
+from motion_transfer.media.work import Journal, WorkFolder, digest_of, was_published, work_path
 
 
 def finish(work: WorkFolder, piece: str, content: str, key: str) -> None:

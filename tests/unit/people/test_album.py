@@ -48,10 +48,10 @@ def test_a_run_that_broke_off_goes_on_and_ends_as_if_it_had_not(tmp_path, monkey
     write_album(options(tmp_path / "whole", count=3))
     real = album._photograph
 
-    def fail_at_two(number: int) -> None:
+    def fail_at_two(options, people, number: int) -> None:
         if number == 2:
             raise KeyboardInterrupt
-        real(number)
+        real(options, people, number)
 
     monkeypatch.setattr(album, "_photograph", fail_at_two)
     with pytest.raises(KeyboardInterrupt):

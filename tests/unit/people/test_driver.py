@@ -12,13 +12,11 @@ from motion_transfer.errors import InputError, OutputError
 
 pytest.importorskip("warp", reason="needs the `people` extra")
 
-from motion_transfer.media.iuv_stream import open_reader, open_stream
-from motion_transfer.people.driver import MotionDriver, MotionOptions
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.people import is_motion
+from motion_transfer.people.driver import MotionDriver, MotionOptions, open_motion, record_motion
 from motion_transfer.people.figure.body import Shape
 from motion_transfer.people.motion.motions import MOTIONS
-from motion_transfer.people.motion_name import is_motion
-from motion_transfer.people.recording import record_motion
-from motion_transfer.people.stream import open_motion
 
 
 @pytest.fixture

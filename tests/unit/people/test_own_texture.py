@@ -14,9 +14,8 @@ pytestmark = pytest.mark.usefixtures("body_model")
 
 from reference.people_iuv import barycentric  # noqa: E402
 
-from motion_transfer.people.figure.charts import load_charts  # noqa: E402
-from motion_transfer.people.figure.exact_iuv import render_iuv  # noqa: E402
-from motion_transfer.people.figure.framing import frame_points  # noqa: E402
+from motion_transfer.people.figure.camera import frame_points  # noqa: E402
+from motion_transfer.people.figure.charts import load_charts, render_iuv  # noqa: E402
 from motion_transfer.people.figure.mesh import Material, Piece  # noqa: E402
 from motion_transfer.people.figure.rasterise import Triangles, rasterise, triangle_ids  # noqa: E402
 from motion_transfer.people.motion.pose_sampler import sample_pose  # noqa: E402
@@ -66,7 +65,7 @@ def differences(piece: Piece, dressed: DressedPerson, model, pose) -> np.ndarray
     borders = cv2.morphologyEx(iuv[..., 0], cv2.MORPH_GRADIENT, np.ones((5, 5))) > 0
     inside = (part > 0) & ~borders & (drawn.coverage == 1)
     assert inside.sum() > 1000
-    return np.abs(painted - drawn.colour)[inside].max(1)
+    return np.abs(painted - drawn.rgba[..., :3])[inside].max(1)
 
 
 def bare(dressed: DressedPerson) -> Piece:

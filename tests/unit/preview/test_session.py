@@ -14,15 +14,15 @@ import pytest
 from PIL import Image
 
 from motion_transfer.batch.expand import expand
-from motion_transfer.batch.manifest_file import read_manifest
+from motion_transfer.batch.manifest import read_manifest
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.media.image import read_photo
-from motion_transfer.preview.draw_queue import StaleError
-from motion_transfer.preview.driver_look import open_look
-from motion_transfer.preview.frame_plans import plan_frames
-from motion_transfer.preview.pictures import NO_FEATURES, Pictures, project_features
+from motion_transfer.events import ignore
+from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.preview.driver import PreviewedDriver, plan_frames
+from motion_transfer.preview.queue import StaleError
 from motion_transfer.preview.session import Session
-from motion_transfer.render.events import ignore
+from motion_transfer.preview.views import Views, project_features
+from motion_transfer.render.driver import open_driver
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.run import run
 
@@ -56,10 +56,14 @@ def picture(data: bytes) -> np.ndarray:
     return np.asarray(Image.open(BytesIO(data)).convert("RGB"))
 
 
-def look_through(options: RenderOptions):
-    look = open_look(options, options.output.parent, ignore)
-    look.look_through(Event(), lambda _count: None)
-    return look
+def open_previewed(options: RenderOptions) -> PreviewedDriver:
+    return PreviewedDriver(open_driver(options, options.output.parent, ignore))
+
+
+def see_all(options: RenderOptions) -> PreviewedDriver:
+    driver = open_previewed(options)
+    driver.see_all(Event(), lambda _count: None)
+    return driver
 
 
 @pytest.mark.parametrize(
@@ -75,12 +79,12 @@ def look_through(options: RenderOptions):
 def test_a_frame_is_the_one_that_the_run_draws(options: RenderOptions, changes: dict) -> None:
     options = replace(options, **changes)
     run(options)
-    look, pictures = look_through(options), Pictures()
-    plans = plan_frames(look, options)
+    driver, views = see_all(options), Views()
+    plans = plan_frames(driver, options)
     assert plans.exact
     for index in (plans.chosen.start, 12, plans.chosen.stop - 1):
         drawn = read_photo(options.output / f"{index - plans.chosen.start:06d}.png").rgb
-        assert np.array_equal(pictures.result(options, look, plans, index), drawn)
+        assert np.array_equal(views.result(options, driver, plans, index), drawn)
 
 
 def test_a_frame_of_the_network_is_the_one_that_the_run_draws(
@@ -88,31 +92,31 @@ def test_a_frame_of_the_network_is_the_one_that_the_run_draws(
 ) -> None:
     options = replace(options, renderer="nhrr", weights=checkpoint, frames=(0, 3))
     run(options)
-    look = look_through(options)
-    shown = Pictures().result(options, look, plan_frames(look, options), 2)
+    driver = see_all(options)
+    shown = Views().result(options, driver, plan_frames(driver, options), 2)
     drawn = read_photo(options.output / "000002.png").rgb
     assert np.abs(shown.astype(int) - drawn).max() <= 1  # batches of one and of four may differ
 
 
 def test_before_the_driver_is_looked_through_a_sample_decides(options: RenderOptions) -> None:
-    look = open_look(options, options.output.parent, ignore)
-    plans = plan_frames(look, options)
+    driver = open_previewed(options)
+    plans = plan_frames(driver, options)
     assert not plans.exact
-    assert len(look.seen) < COUNT
-    look.look_through(Event(), lambda _count: None)
-    whole = plan_frames(look, options).shots[0].window
+    assert len(driver.seen) < COUNT
+    driver.see_all(Event(), lambda _count: None)
+    whole = plan_frames(driver, options).shots[0].window
     near = plans.shots[0].window
     assert abs(near.x - whole.x) <= 4
     assert abs(near.side - whole.side) <= 8
-    assert Pictures().result(options, look, plans, 1).shape == (96, 64, 3)
+    assert Views().result(options, driver, plans, 1).shape == (96, 64, 3)
 
 
 def test_frames_outside_the_chosen_ones_can_be_seen(options: RenderOptions) -> None:
     options = replace(options, frames=(10, 20))
-    look = look_through(options)
-    plans = plan_frames(look, options)
+    driver = see_all(options)
+    plans = plan_frames(driver, options)
     for index in (0, 39):
-        assert len(np.unique(Pictures().result(options, look, plans, index))) > 5
+        assert len(np.unique(Views().result(options, driver, plans, index))) > 5
 
 
 def test_a_broken_frame_is_marked_and_the_others_are_shown(
@@ -131,12 +135,13 @@ def test_a_broken_frame_is_marked_and_the_others_are_shown(
 
 def test_a_video_can_be_read_in_any_order(studio, options: RenderOptions, monkeypatch) -> None:
     walk = studio.walk(30)
-    look = open_look(replace(options, driver=studio.video(walk)), options.output.parent, ignore)
+    driver = open_previewed(replace(options, driver=studio.video(walk)))
     opened = []
-    read = look.reader.read
-    monkeypatch.setattr(look.reader, "read", lambda *ends: opened.append(ends) or read(*ends))
+    reader = driver.opened.reader
+    read = reader.read
+    monkeypatch.setattr(reader, "read", lambda *ends: opened.append(ends) or read(*ends))
     for index in (20, 3, 4, 5, 6, 20, 29, 0):
-        assert np.array_equal(look.read(index), walk[index])
+        assert np.array_equal(driver.read(index), walk[index])
     assert opened == [(20, 21), (3, 4), (4, 20), (29, 30), (0, 1)]
 
 
@@ -164,7 +169,7 @@ def test_the_texture_renderer_has_no_feature_map(options: RenderOptions, open_se
     session = open_session(options)
     session.wait_for_plan()
     for future in (session.ask_still("map"), session.ask_frame(0, "features", session.key)):
-        with pytest.raises(InputError, match=NO_FEATURES):
+        with pytest.raises(InputError, match="the texture renderer has no feature map"):
             future.result()
 
 

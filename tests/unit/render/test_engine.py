@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import torch
 
+from motion_transfer.drawing.renderers.interface import Occupied
 from motion_transfer.errors import RenderError
+from motion_transfer.events import ignore
 from motion_transfer.media.work import WorkFolder
+from motion_transfer.render.composition import Prepared
 from motion_transfer.render.engine import Engine
-from motion_transfer.render.events import ignore
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.plan import CHUNK_FRAMES
-from motion_transfer.render.prepare import Prepared
-from motion_transfer.render.renderer import Occupied
 from motion_transfer.render.run import prepare
 
 FRAMES = CHUNK_FRAMES + 9
@@ -67,7 +67,7 @@ def prepared(studio) -> Prepared:
         renderer="texture",
     )
     with WorkFolder(options.output) as work:
-        return prepare(options, work, ignore)[0]
+        return prepare(options, work, ignore).prepared
 
 
 def rendered(prepared: Prepared, renderer: Slow, folder: Path, **settings: Any) -> list[bytes]:

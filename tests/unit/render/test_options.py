@@ -8,14 +8,8 @@ from pathlib import Path
 import pytest
 
 from motion_transfer.errors import InputError
-from motion_transfer.render.options import (
-    RenderOptions,
-    parse_colour,
-    parse_frames,
-    parse_parts,
-    parse_rate,
-    parse_window,
-)
+from motion_transfer.option import parse_colour, parse_frames, parse_rate
+from motion_transfer.render.options import RenderOptions, parse_parts, parse_window
 from nhrr_core import PART_GROUPS, PART_NAMES
 
 

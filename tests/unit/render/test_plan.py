@@ -7,19 +7,20 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from motion_transfer.drawing.person import Box, People, Person
+from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError
-from motion_transfer.media.iuv_stream import open_reader, open_stream
-from motion_transfer.render.missing import FramePlan, list_stretches
-from motion_transfer.render.person import People, Person
+from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.render.plan import (
     CHUNK_FRAMES,
     DriverPlan,
+    FramePlan,
     SeenFrame,
     frame_range,
+    list_stretches,
     plan_path,
     scan_people,
 )
-from motion_transfer.render.window import Window
 
 
 def plan(studio, iuvs: np.ndarray, **changes) -> DriverPlan:
@@ -105,7 +106,7 @@ def test_only_crowded_frames_are_isolated(studio) -> None:
     frames[1, :, 96:] = studio.iuv(parts=(2, 23, 24))
     planned = plan(studio, frames)
     assert [frame.alone for frame in planned.frames] == [True, False]
-    assert planned.frames[1].person.x1 < 96
+    assert planned.frames[1].person.box.right < 96
 
 
 def test_held_frames_show_the_last_one_with_somebody(studio) -> None:
@@ -149,9 +150,9 @@ def test_each_shot_has_its_own_window_and_person(studio) -> None:
     assert [(shot.start, shot.stop) for shot in planned.shots] == [(0, 5), (5, 8)]
     left, right = (shot.window for shot in planned.shots)
     assert left.x + left.side < right.x
-    assert all(frame.person.x0 >= 160 for frame in planned.frames[5:])
+    assert all(frame.person.box.left >= 160 for frame in planned.frames[5:])
     (whole,) = plan(studio, frames).shots
-    assert all(frame.person.x1 <= 64 for frame in plan(studio, frames).frames[:5])
+    assert all(frame.person.box.right <= 64 for frame in plan(studio, frames).frames[:5])
     assert (whole.start, whole.stop) == (0, 8)
 
 
@@ -175,7 +176,7 @@ def test_nobody_in_particular_is_whoever_is_there(studio) -> None:
     frames[0, :96, :64] = studio.iuv()
     frames[1, :, 100:300] = studio.iuv(scale=3, size=(300, 200))
     assert plan(studio, frames).frames[1].person is None
-    assert plan(studio, frames, person=None).frames[1].person.x0 >= 100
+    assert plan(studio, frames, person=None).frames[1].person.box.left >= 100
 
 
 def test_chunks_are_divided_at_cuts(studio) -> None:
@@ -186,7 +187,7 @@ def test_chunks_are_divided_at_cuts(studio) -> None:
 
 
 def test_a_given_window_is_every_shots() -> None:
-    seen = [SeenFrame(People((Person(4, 5, 20, 60, 500, (1,)),), 1), "")] * 6
+    seen = [SeenFrame(People((Person(Box(4, 5, 20, 60), 500, (1,)),), 1), "")] * 6
     planned = plan_path(
         seen,
         chosen=range(6),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motion_transfer.render.sheet import SHEET_FRAMES, ContactSheet
+from motion_transfer.render.engine import SHEET_FRAMES, ContactSheet
 
 
 @pytest.mark.parametrize("count", [1, 3, 12, 100])

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.iuv_stream import open_reader, open_stream
-from motion_transfer.repair.flicker import FlickerMeter
+from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.repair.gaps import blend, fill_gaps
-from motion_transfer.repair.run import RepairOptions, repair_iuv
+from motion_transfer.repair.run import FlickerMeter, RepairOptions, remove_speckles, repair_iuv
 from motion_transfer.repair.smoothing import smooth
-from motion_transfer.repair.speckles import remove_speckles
 
 
 def measure(frames):

@@ -16,11 +16,12 @@ from motion_transfer.training.faces import (
     CROP_CENTRE,
     METRES_PER_CROP_PIXEL,
     FaceIdentity,
+    SphereFace20,
     crop_boxes,
     face_table,
     find_faces,
+    load_sphereface,
 )
-from motion_transfer.training.sphereface import SphereFace20, load_sphereface
 from nhrr_core import UVLayout, load_uv_layout
 
 DEMO = Path(__file__).parents[3] / "motion_transfer" / "demo"

@@ -11,11 +11,12 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from motion_transfer.errors import InputError, WeightsError
-from motion_transfer.training.efficientnet_lite0 import EfficientNetLite0, SamePadConv2d
 from motion_transfer.training.feature_networks import (
     EFFICIENTNET_PACKAGE,
     EfficientNetFeatures,
+    EfficientNetLite0,
     FeatureNetwork,
+    SamePadConv2d,
     Vgg19Features,
     efficientnet_input,
     load_efficientnet_lite0,

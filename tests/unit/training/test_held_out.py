@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("warp", reason="needs the `people` extra")
 
-from motion_transfer.training.streamed import StreamedPairs, held_out_pairs
+from motion_transfer.training.sources import StreamedPairs, held_out_pairs
 
 
 def test_its_people_are_never_those_of_training(body_model):

@@ -12,7 +12,7 @@ from scipy.linalg import sqrtm
 from skimage.metrics import structural_similarity
 
 import motion_transfer
-from motion_transfer.media.image import read_photo
+from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.training.metrics import (
     average_ssim,
     feature_distance,

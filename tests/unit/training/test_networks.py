@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch import nn
 
-from motion_transfer.training.config_file import build_config
-from motion_transfer.training.networks import build_state
+from motion_transfer.training.config import build_config
+from motion_transfer.training.trainer import build_state
 from nhrr_core import ModelConfig, NeuralReRenderer
 
 SMALL = ModelConfig(

@@ -29,10 +29,7 @@ def test_both_headers_are_read(studio, header: str) -> None:
     lead = "," if header.startswith(",") else ""  # a column of row numbers, as pandas writes
     path = write(studio, f"{header}\n{lead}a.png,b.png\n\n{lead} c/d.jpg , a.png\n")
     rows, problems = read_pair_list(path)
-    assert [(row.line, row.source, row.target) for row in rows] == [
-        (2, "a.png", "b.png"),
-        (4, "c/d.jpg", "a.png"),
-    ]
+    assert rows == [(2, "a.png", "b.png"), (4, "c/d.jpg", "a.png")]
     assert problems == []
 
 

@@ -3,36 +3,46 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
+from motion_transfer.drawing.person import find_people
+from motion_transfer.drawing.window import Window, plan_window
 from motion_transfer.errors import InputError
-from motion_transfer.render.person import find_people
-from motion_transfer.render.window import Window, plan_window
+from motion_transfer.training.config import build_config
 from motion_transfer.training.pairs import open_pairs
 from motion_transfer.training.samples import (
-    RunSampler,
-    SampleSettings,
     TrainingSamples,
     cut_picture,
+    number_batches,
     person_window,
 )
 
 
-def open_samples(path: Path, **changes) -> TrainingSamples:
+def open_samples(
+    path: Path, *, textures: Path | None = None, half_size_samples: int = 0, **changes: Any
+) -> TrainingSamples:
+    """Samples of a run on a list of pairs; other changes are settings by their key."""
     settings = {
-        "seed": 0,
-        "image_size": 64,
-        "texture_size": 64,
-        "background": "#00ff00",
-        "jitter": 0.3,
-        "alpha": True,
-        "target_texture": True,
-        "textures": None,
+        "data.source": str(path),
+        "data.background": "#00ff00",
+        "data.jitter": 0.3,
+        "model.image_size": 64,
+        "model.texture_size": 64,
+        "model.alpha": True,
+        "model.clearance": False,
     }
-    return TrainingSamples(open_pairs(path), SampleSettings(**{**settings, **changes}))
+    known = {name.partition(".")[2]: name for name in (*settings, "run.seed")}
+    settings |= {known[key]: value for key, value in changes.items()}
+    return TrainingSamples(
+        open_pairs(path),
+        build_config(settings),
+        textures=textures,
+        half_size_samples=half_size_samples,
+    )
 
 
 def same(one: dict, other: dict) -> bool:
@@ -158,7 +168,7 @@ def test_without_jitter_the_window_is_the_renderers(studio, paint_pairs) -> None
     pairs = open_pairs(paint_pairs(1))
     target = pairs[0].target.load()
     people = find_people(target.iuv)
-    assert person_window(target) == plan_window(list(people.persons))
+    assert person_window(target) == plan_window([person.box for person in people.persons])
 
 
 def test_windows_of_about_the_image_size_are_not_scaled(paint_pairs) -> None:
@@ -196,7 +206,7 @@ def test_beyond_the_photo(studio) -> None:
 def test_processes_share_the_numbers() -> None:
     def batches(steps: range, process: int, processes: int = 2) -> list[list[int]]:
         return list(
-            RunSampler(
+            number_batches(
                 batch_size=3,
                 accumulation=2,
                 steps=steps,

@@ -12,11 +12,20 @@ from torch import Tensor, nn
 
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.training.config import LossSettings
-from motion_transfer.training.faces import FaceIdentity
+from motion_transfer.training.faces import FaceIdentity, SphereFace20
 from motion_transfer.training.feature_networks import FeatureNetwork
-from motion_transfer.training.sphereface import SphereFace20
-from motion_transfer.training.step import Arithmetic, Average, Players, set_stage, update
-from motion_transfer.training.terms import Drawn, Generator, Judges, load_judges, shown_image
+from motion_transfer.training.step import (
+    Arithmetic,
+    Average,
+    Drawn,
+    Generator,
+    Judges,
+    Players,
+    load_judges,
+    set_stage,
+    shown_image,
+    update,
+)
 from nhrr_core import VARIANTS, Discriminator, LossWeights, ModelConfig, NeuralReRenderer
 
 PLAIN = Arithmetic(nullcontext, lambda loss: loss.backward(), lambda network: network)

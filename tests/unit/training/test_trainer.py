@@ -11,8 +11,8 @@ import torch
 from safetensors.torch import load_file
 
 from motion_transfer.errors import InputError, OutputError, TrainingError, WeightsError
-from motion_transfer.training.config_file import build_config, read_settings
-from motion_transfer.training.events import Logged, TrainResult
+from motion_transfer.training.config import build_config, read_settings
+from motion_transfer.training.progress import Logged, TrainResult
 from motion_transfer.training.runs import plan_new_run, plan_resumed_run, prepare
 from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint
 from nhrr_core import VARIANTS

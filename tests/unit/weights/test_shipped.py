@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import torch
 
+from motion_transfer import weights
 from motion_transfer.errors import WeightsError
-from motion_transfer.weights import shipped as module
+from motion_transfer.weights import DEFAULT_WEIGHTS, SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint
-from motion_transfer.weights.shipped import DEFAULT_WEIGHTS, SHIPPED, find_weights
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -44,6 +44,6 @@ def test_a_path_is_a_path(tmp_path: Path) -> None:
 
 
 def test_a_package_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "SHIPPED", ("lite", "lost"))
+    monkeypatch.setattr(weights, "SHIPPED", ("lite", "lost"))
     with pytest.raises(WeightsError, match=r"lost should have come .* --renderer texture"):
         find_weights(Path("lost"))

@@ -9,14 +9,8 @@ import numpy as np
 import pytest
 
 from motion_transfer.errors import InputError
-from motion_transfer.people.clothes.fabric_colours import luminance
-from motion_transfer.people.clothes.fabrics import (
-    KINDS,
-    Fabric,
-    paint_fabric,
-    sample_colour,
-    sample_fabric,
-)
+from motion_transfer.people.clothes.fabrics import KINDS, Fabric, paint_fabric, sample_fabric
+from motion_transfer.people.clothes.fabrics.colours import luminance, sample_colour
 
 BLACK, WHITE = (0.05, 0.05, 0.05), (0.95, 0.95, 0.95)
 

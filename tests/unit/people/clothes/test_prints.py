@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from motion_transfer.errors import InputError
-from motion_transfer.people.clothes.fabric_colours import luminance
-from motion_transfer.people.clothes.fabrics import sample_colour
-from motion_transfer.people.clothes.print_pictures import PICTURES
+from motion_transfer.people.clothes.fabrics.colours import luminance, sample_colour
 from motion_transfer.people.clothes.prints import PRINT_KINDS, Print, paint_print, sample_print
+from motion_transfer.people.clothes.prints.pictures import PICTURES
 
 INKS = ((0.9, 0.1, 0.1), (0.1, 0.1, 0.9), (0.1, 0.8, 0.1))
 

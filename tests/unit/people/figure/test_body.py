@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from motion_transfer import extras
 from motion_transfer.errors import InputError
-from motion_transfer.people.figure.body import Shape
+from motion_transfer.people.figure.body import Shape, is_cached, load_body_model
 
 
 def turn_about_y(angle: float) -> np.ndarray:
@@ -76,8 +77,7 @@ def test_an_unknown_bone_is_a_key_error(body_model):
 
 
 def test_without_the_extra_the_command_that_installs_it_is_named(monkeypatch):
-    from motion_transfer.people import extra
-
-    monkeypatch.setattr(extra, "find_spec", lambda _name: None)
-    with pytest.raises(InputError, match=r"pip install 'motion-transfer\[people\]'"):
-        extra.require_people()
+    monkeypatch.setattr(extras, "find_spec", lambda _name: None)
+    for ask in (load_body_model.__wrapped__, is_cached):
+        with pytest.raises(InputError, match=r"pip install 'motion-transfer\[people\]'"):
+            ask()

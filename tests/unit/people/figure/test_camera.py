@@ -1,13 +1,14 @@
-"""The pinhole camera against geometry done by hand."""
+"""The pinhole camera against geometry done by hand, and cameras that are pointed at points."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from motion_transfer.people.figure.camera import Camera
+from motion_transfer.people.figure.camera import Camera, frame_points
 
 CAMERA = Camera(200, 100, 100.0, 4.0, (0.0, 0.0, 1.0))
+SIZE = (240, 320)
 
 
 def project(camera: Camera, *point: float) -> list[float]:
@@ -43,3 +44,30 @@ def test_roll_turns_the_picture_clockwise():
 def test_a_finer_picture_shows_the_same():
     x, y, z = project(CAMERA, 0.3, 0.1, 1.7)
     assert project(CAMERA.scaled(3), 0.3, 0.1, 1.7) == pytest.approx([3 * x, 3 * y, z], rel=1e-5)
+
+
+@pytest.fixture
+def points() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return (rng.uniform(-1, 1, (300, 3)) * [0.5, 0.3, 0.9] + [0.2, 0.5, 1]).astype(np.float32)
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 2.5])
+@pytest.mark.parametrize("elevation", [-0.2, 0.5])
+def test_points_fill_the_picture_up_to_the_margin(points, azimuth, elevation):
+    camera = frame_points(
+        points, SIZE, distance=3.0, azimuth=azimuth, elevation=elevation, roll=0.1, margin=0.1
+    )
+    seen = camera.project(points)[:, :2] / SIZE
+    assert seen.min() >= 0.1 - 0.005 and seen.max() <= 0.9 + 0.005
+    assert max(np.ptp(seen, axis=0)) == pytest.approx(0.8, abs=0.01)
+    middle = (seen.min(0) + seen.max(0)) / 2
+    assert middle == pytest.approx([0.5, 0.5], abs=0.01)
+
+
+def test_a_shift_uses_the_free_space(points):
+    still = frame_points(points, SIZE, distance=3.0, margin=0.1)
+    moved = frame_points(points, SIZE, distance=3.0, margin=0.1, shift=(1, 1))
+    before, after = (camera.project(points)[:, :2] for camera in (still, moved))
+    assert (after - before).mean(0) == pytest.approx(SIZE - before.max(0), abs=6)
+    assert after.max(0) == pytest.approx(SIZE, abs=6)  # perspective changes a little

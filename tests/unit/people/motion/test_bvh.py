@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from motion_transfer.errors import InputError
 from motion_transfer.people.motion.bvh import bvh_poses, read_bvh
-from motion_transfer.people.motion.bvh_skeleton import base_name, find_roles, tracks
+from motion_transfer.people.motion.bvh.skeleton import base_name, find_roles, tracks
 from motion_transfer.people.motion.motions import MOTIONS
 from motion_transfer.people.motion.poses import Arm, Leg, Pose, pose_rotations
 

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from motion_transfer.people.motion.capsules import FIRST, PARTS, SECOND, Capsules
-from motion_transfer.people.motion.gestures import GESTURES, touches
 from motion_transfer.people.motion.pose_sampler import (
+    GESTURES,
     KINDS,
-    limbs_apart,
     sample_pose,
     sample_turn,
-    untangled,
+    touches,
 )
 from motion_transfer.people.motion.poses import (
     Arm,
@@ -23,6 +22,7 @@ from motion_transfer.people.motion.poses import (
     numbers,
     pose_rotations,
 )
+from motion_transfer.people.motion.untangling import limbs_apart, untangled
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from motion_transfer.people.picture.background_view import Painting, View, cells, hsv
 from motion_transfer.people.picture.backgrounds import (
     FLOOR_SHARES,
     KIND_SHARES,
@@ -16,6 +15,7 @@ from motion_transfer.people.picture.backgrounds import (
     paint_background,
     sample_background,
 )
+from motion_transfer.people.picture.backgrounds.view import Painting, View, cells, hsv
 
 KINDS = list(KIND_SHARES)
 HORIZON, PPM = 50.0, 45.0

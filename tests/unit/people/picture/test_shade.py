@@ -51,14 +51,19 @@ def plate(
     )
 
 
+def colour(seen: Shading) -> np.ndarray:
+    """Linear RGB, multiplied by the coverage."""
+    return seen.rgba[..., :3]
+
+
 def middle(seen: Shading) -> np.ndarray:
-    return seen.colour[16, 16]
+    return colour(seen)[16, 16]
 
 
 def test_without_light_a_surface_shows_its_own_colour():
     seen = shade([plate()], CAMERA, None)
     assert middle(seen) == pytest.approx([0.5, 0.25, 0.1], abs=1e-6)
-    assert seen.colour[0, 0].tolist() == [0, 0, 0] and seen.coverage[0, 0] == 0
+    assert colour(seen)[0, 0].tolist() == [0, 0, 0] and seen.coverage[0, 0] == 0
 
 
 def test_coverage_is_the_share_of_samples():
@@ -72,9 +77,9 @@ def test_coverage_is_the_share_of_samples():
 def test_the_texture_lies_the_right_way_up():
     texture = np.zeros((8, 8, 4), np.float32)
     texture[:4, :, 0], texture[:, :4, 1] = 1, 1  # red above, green on the left
-    colour = shade([plate(texture=texture)], CAMERA, None).colour
-    assert colour[8, 20].tolist() == pytest.approx([1, 0, 0])
-    assert colour[24, 10].tolist() == pytest.approx([0, 1, 0])
+    seen = shade([plate(texture=texture)], CAMERA, None)
+    assert colour(seen)[8, 20].tolist() == pytest.approx([1, 0, 0])
+    assert colour(seen)[24, 10].tolist() == pytest.approx([0, 1, 0])
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
@@ -94,8 +99,8 @@ def test_what_stands_in_the_way_of_the_key_throws_a_shadow():
     wall = plate()
     from_the_left = lamp(np.pi / 4)  # the lamp is at +x, so the shadow falls towards -x
     seen = shade([wall, screen], CAMERA, from_the_left)
-    assert seen.colour[16, 8].max() < 0.05  # x = -0.5 of the wall
-    assert seen.colour[16, 26] == pytest.approx(
+    assert colour(seen)[16, 8].max() < 0.05  # x = -0.5 of the wall
+    assert colour(seen)[16, 26] == pytest.approx(
         np.cos(np.pi / 4) * np.array([0.5, 0.25, 0.1]), rel=0.02
     )
 
@@ -103,8 +108,8 @@ def test_what_stands_in_the_way_of_the_key_throws_a_shadow():
 def test_gaps_are_darker_where_occlusion_is_asked_for():
     light = Light((Lamp(0, 0, DARK),), WHITE, WHITE, 0.01, 0.0)
     pieces = [plate(), plate(half=0.3, y=-0.1)]
-    open_air = shade(pieces, CAMERA, light).colour
-    closed = shade(pieces, CAMERA, replace(light, occlusion=1.0)).colour
+    open_air = colour(shade(pieces, CAMERA, light))
+    closed = colour(shade(pieces, CAMERA, replace(light, occlusion=1.0)))
     beside, far = (16, 10), (16, 4)  # on the wall, beside the small plate and away from it
     assert closed[beside][0] < 0.9 * open_air[beside][0]
     assert closed[far][0] == pytest.approx(open_air[far][0], rel=0.02)

@@ -1,0 +1,113 @@
+"""Options of commands: made from their one description, and listed under headings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial, reduce
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import click
+
+from motion_transfer.option import Option, list_options
+
+FILE = click.Path(path_type=Path)
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+class SectionOption(click.Option):
+    """An option that knows under which heading it belongs."""
+
+    def __init__(self, *arguments: Any, section: str = "Options", **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        self.section = section
+
+
+def section(heading: str) -> Any:
+    """Make an option decorator whose options stand under one heading."""
+    return partial(click.option, cls=SectionOption, section=heading)
+
+
+class SectionCommand(click.Command):
+    """A command whose help lists options under their headings, in order of appearance."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None and isinstance(parameter, click.Option):
+                sections.setdefault(getattr(parameter, "section", "Other"), []).append(record)
+        for heading, records in sections.items():
+            with formatter.section(heading):
+                formatter.write_dl(records)
+
+
+class WordsCommand(SectionCommand):
+    """A command without arguments, whose repeatable options take several words at once.
+
+    `--weights a b --weights c` is `--weights a --weights b --weights c`.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        repeatable = {
+            name
+            for parameter in self.params
+            if isinstance(parameter, click.Option) and parameter.multiple
+            for name in parameter.opts
+        }
+        spread: list[str] = []
+        option, used = "", False  # the repeatable one that is being read; whether it has a value
+        for word in args:
+            if word.startswith("-") and len(word) > 1:
+                name, _, value = word.partition("=")
+                option, used = (name if name in repeatable else ""), bool(value)
+            elif option and used:
+                spread.append(option)
+            else:
+                used = True
+            spread.append(word)
+        return super().parse_args(ctx, spread)
+
+
+def described_options(options_class: type, *, required: bool = True) -> Decorator:
+    """Make a decorator that adds every described option of a dataclass.
+
+    What was not written reaches the command as None (several words: as an empty tuple); a field's
+    own default then holds, as `options_from_words` has it.
+
+    Args:
+        required: Whether an option without a default has to be given; a manifest may say it.
+    """
+    entries = list_options(options_class)
+    adders = [_decorators(entry, required=required and entry.required) for entry in entries]
+    return add_options(list(chain(*adders)))
+
+
+def add_options(adders: list[Decorator]) -> Decorator:
+    """Make a decorator that adds options, in order."""
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        return reduce(lambda made, add: add(made), reversed(adders), command)
+
+    return decorate
+
+
+def _decorators(entry: Option, *, required: bool) -> list[Decorator]:
+    common: dict[str, Any] = {"cls": SectionOption, "section": entry.section, "help": entry.help}
+    if entry.kind == "garments":
+        photo, parts = entry.flags
+        names = "Such as torso,upper-legs; `mt info parts` lists the names."
+        return [
+            click.option(photo, entry.name, multiple=True, metavar="PHOTO[,IUV]", **common),
+            click.option(parts, multiple=True, metavar="PARTS", **{**common, "help": names}),
+        ]
+    if entry.kind == "flag":
+        common |= {"is_flag": True, "default": None}
+    elif entry.kind == "switch":
+        common["default"] = None
+    else:
+        numbers = {"integer": int, "number": float}
+        common |= {"type": numbers.get(entry.kind, str), "metavar": entry.metavar}
+        common |= {"required": required, "multiple": entry.kind in ("paths", "words")}
+    return [click.option(*entry.flags, entry.name, **common)]

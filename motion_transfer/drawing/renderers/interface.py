@@ -1,0 +1,104 @@
+"""What a renderer is asked for, and its recipe, from which any process can make it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from jaxtyping import Float, Shaped, UInt8
+
+from motion_transfer.drawing.source import Source
+
+Appearance = Shaped[np.ndarray, "..."]
+"""What a renderer knows of a source: the network's feature map, or the table of its texture."""
+
+Occupied = Literal["core", "device", "nothing"]
+"""What a call keeps busy for long: a `core`, so that there are threads for calls alone, one for
+each worker; the `device`, so that one thread makes them; or `nothing`, and whoever wants a picture
+draws it."""
+
+
+class Renderer(Protocol):
+    """Turns crops of target IUV into pictures of one source; called from several threads.
+
+    Attributes:
+        name: What `mt run` reports.
+        batch_size: Frames a call; the engine pads the last batch of a chunk to it.
+        occupies: What a call keeps busy.
+        feature_channels: How many channels of its appearance are learned features; 0: none is.
+    """
+
+    name: str
+    batch_size: int
+    occupies: Occupied
+    feature_channels: int
+
+    def working_size(self, window_side: int) -> int:
+        """Tell the side, px, of the crops it wants for a window of that side, px, in the driver."""
+        ...
+
+    def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:
+        """Draw RGB and coverage of each crop; colour is defined wherever coverage is not 0."""
+        ...
+
+    def feature_image(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> Float[np.ndarray, "B D S S"]:
+        """Look the appearance up as the target's pixels see it; only where there are features."""
+        ...
+
+
+class Recipe(Protocol):
+    """How to make a renderer, the same in every process: it is hashable and can be pickled.
+
+    Attributes:
+        name: The renderer's.
+        content: What decides the appearance of a source, besides the source.
+        compiled: Whether it is compiled, which may change the last bits of a picture.
+        texture_size: Side, texels, of the partial texture that `appearance_of` wants.
+        occupies: What a call of the renderer will keep busy.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def content(self) -> str: ...
+    @property
+    def compiled(self) -> bool: ...
+    @property
+    def texture_size(self) -> int: ...
+    @property
+    def occupies(self) -> Occupied: ...
+
+    def facts(self) -> dict[str, Any]:
+        """Tell what it draws with, for results files; empty for a renderer without weights."""
+        ...
+
+    def working_size(self, window_side: int) -> int:
+        """Tell the side of the crops that the renderer will want, px. Raises: WeightsError."""
+        ...
+
+    def made_ready(
+        self,
+        wish: bool | None,
+        frame_count: int,
+        window_sides: Collection[int],
+        say: Callable[[str], object],
+    ) -> Recipe:
+        """Load what draws and, if it is to be, compile it; give the recipe that says so.
+
+        Args:
+            wish: Whether to compile; None: where it pays.
+            frame_count: How many frames will be drawn.
+            window_sides: Of the windows in the driver, px, which it is compiled for.
+            say: Told what takes long.
+        Raises: WeightsError; InputError if compiling is asked for and cannot be had.
+        """
+        ...
+
+    def appearance_of(self, source: Source) -> Appearance:
+        """Compute what has to be computed once per source. Raises: WeightsError."""
+        ...
+
+    def renderer(self, appearance: Appearance) -> Renderer:
+        """Make a renderer of one source; what it loads stays warm. Raises: WeightsError."""
+        ...

@@ -1,0 +1,159 @@
+"""The renderer without a network: the texture is completed, looked up, and softly cut out.
+
+What the source hides takes the colour of its mirror image: first the other side of the body, then
+the other face of the same limb. What is left takes the colours around it on the body's surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, UInt8
+from scipy.spatial import KDTree
+from torch import Tensor
+
+from motion_transfer.drawing.renderers.interface import Appearance, Occupied
+from motion_transfer.drawing.source import Source
+from nhrr_core import PART_GROUPS, UVLayout, load_uv_layout, mirror_texture, sample_features
+from nhrr_core.iuv import PART_COUNT
+from nhrr_core.uv_layout import CHART_SIZE, TWIN_SIZE
+
+TEXTURE_SIZE = 256
+NEIGHBOURS = 12  # seen texels that a hidden one is mixed from; chosen by eye
+OWN_SHARE = 0.05  # of a limb's texels: with fewer known, its own colours say too little
+REFLECTION_METRES = 0.05  # patterns continue so far, then fade over as much again
+NEAR_METRES = 0.01  # distances below this count alike, so that a single texel cannot dominate
+EDGE_BLUR_SHARE = 1 / 180  # of the crop's side: the width over which the outline fades
+
+CODE_WEIGHTS = np.array([[CHART_SIZE**2, 1, CHART_SIZE]], np.float32)
+"""(I, U, V) to its row in the table; below 2**24, hence exact in float32."""
+
+
+@dataclass(frozen=True)
+class TextureRecipe:
+    """Makes `TextureRenderer`s: nothing has to be loaded."""
+
+    name = "texture"
+    content = ""
+    compiled = False
+    texture_size = TEXTURE_SIZE
+    occupies: Occupied = "nothing"
+
+    def facts(self) -> dict[str, Any]:
+        return {}
+
+    def working_size(self, window_side: int) -> int:
+        return window_side
+
+    def made_ready(self, *_wishes: object) -> TextureRecipe:
+        return self
+
+    def appearance_of(self, source: Source) -> Appearance:
+        return tabulate_texture(source)
+
+    def renderer(self, appearance: Appearance) -> TextureRenderer:
+        return TextureRenderer(appearance)
+
+
+class TextureRenderer:
+    """Draws a source by looking up each (I, U, V) in a table of its 25 x 256 x 256 colours.
+
+    8-bit IUV has no more values than that, so the texture is sampled once per source, by the same
+    sampler as the network's, and a frame costs one look-up a pixel.
+    """
+
+    name = "texture"
+    batch_size = 1
+    occupies: Occupied = "nothing"
+    feature_channels = 0
+
+    def __init__(self, table: UInt8[np.ndarray, "25 256 256 4"]) -> None:
+        self._table = table.view(np.uint32).reshape(-1)
+
+    def working_size(self, window_side: int) -> int:
+        return window_side
+
+    def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:
+        return np.stack([self._draw(crop) for crop in iuv])
+
+    def feature_image(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> Float[np.ndarray, "B D S S"]:
+        raise NotImplementedError("there are no features")
+
+    def _draw(self, iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S 4"]:
+        index = cv2.transform(iuv.astype(np.float32), CODE_WEIGHTS).astype(np.int32)
+        rgba = self._table.take(index).view(np.uint8).reshape(*iuv.shape[:2], 4)
+        rgba[..., 3] = soften(rgba[..., 3])
+        return rgba
+
+
+def tabulate_texture(source: Source) -> UInt8[np.ndarray, "25 256 256 4"]:
+    """Look up the completed texture for every (I, V, U): RGB, and coverage, 0 for part 0."""
+    layout = load_uv_layout()
+    texture = complete_texture(source.texture, source.visibility, layout)
+    v, u = np.mgrid[:CHART_SIZE, :CHART_SIZE].astype(np.uint8)
+    codes = np.stack([np.stack([np.full_like(u, i), u, v]) for i in range(PART_COUNT + 1)])
+    colours = sample_features(texture, torch.from_numpy(codes), layout.charts)
+    table = np.zeros((PART_COUNT + 1, CHART_SIZE, CHART_SIZE, 4), np.uint8)
+    table[..., :3] = ((colours + 1) * 127.5).round().clamp(0, 255).permute(0, 2, 3, 1).numpy()
+    table[1:, ..., 3] = 255
+    return table
+
+
+def soften(mask: UInt8[np.ndarray, "S S"]) -> UInt8[np.ndarray, "S S"]:
+    """Fade a 0/255 mask inwards: colours outside it are not known, so nothing may grow."""
+    width = max(1, round(mask.shape[0] * EDGE_BLUR_SHARE)) * 2 + 1
+    blurred = cv2.blur(mask, (width, width))
+    return cv2.min(cv2.addWeighted(blurred, 2, blurred, 0, -255), mask)
+
+
+def complete_texture(
+    texture: Float[Tensor, "1 3 T T"], visibility: Float[Tensor, "1 1 T T"], layout: UVLayout
+) -> Float[Tensor, "1 3 256 256"]:
+    """Fill every texel that is not visible; visible ones pass unchanged."""
+    if texture.shape[-1] != TWIN_SIZE:
+        texture = F.interpolate(texture, (TWIN_SIZE, TWIN_SIZE), mode="area")
+        visibility = (F.interpolate(visibility, (TWIN_SIZE, TWIN_SIZE), mode="area") == 1).float()
+    texture, shown = mirror_texture(texture, visibility, layout.side_twin, layout.depth_twin)
+    colours = texture[0].permute(1, 2, 0).reshape(-1, 3).clone()
+    known = shown[0, 0].reshape(-1) > 0
+    if known.all() or not known.any():
+        return colours.view(1, TWIN_SIZE, TWIN_SIZE, 3).permute(0, 3, 1, 2)
+
+    points, part = layout.position.reshape(-1, 3).numpy(), layout.part.reshape(-1).numpy()
+    seen, values = known.numpy(), colours.numpy()
+    for limb in PART_GROUPS.values():
+        members = np.isin(part, limb)
+        given = members & seen
+        if given.sum() < OWN_SHARE * members.sum():
+            given = seen  # the limb shows nothing to go by: its neighbours on the body must do
+        hidden = members & ~seen
+        if hidden.any():
+            values[hidden] = _fill(points[hidden], points[given], values[given])
+    return torch.from_numpy(values).view(1, TWIN_SIZE, TWIN_SIZE, 3).permute(0, 3, 1, 2)
+
+
+def _fill(
+    hidden: Float[np.ndarray, "N 3"],
+    seen: Float[np.ndarray, "M 3"],
+    colours: Float[np.ndarray, "M C"],
+) -> Float[np.ndarray, "N C"]:
+    """Guess the colours of hidden places on the body from those of seen ones.
+
+    Near the border of what is seen, its pattern continues by reflection at the border; further
+    away only a mean of the surroundings can be told.
+    """
+    tree = KDTree(seen)
+    distance, nearest = tree.query(hidden, k=min(NEIGHBOURS, len(seen)))
+    distance, nearest = distance.reshape(len(hidden), -1), nearest.reshape(len(hidden), -1)
+    weight = 1 / np.maximum(distance, NEAR_METRES) ** 2
+    weight /= weight.sum(1, keepdims=True)
+    mean = np.einsum("nk,nkc->nc", weight, colours[nearest])
+    border = np.einsum("nk,nkc->nc", weight, seen[nearest])
+    reflected = colours[tree.query(2 * border - hidden)[1]]
+    blend = np.clip(2 - distance[:, :1] / REFLECTION_METRES, 0, 1)
+    return (blend * reflected + (1 - blend) * mean).astype(colours.dtype)

@@ -1,0 +1,214 @@
+"""What a renderer knows of a source: photos and IUV, unfolded into one partial texture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from torch import Tensor
+
+from motion_transfer.drawing.outline import clearance_of, grab_cut
+from motion_transfer.drawing.person import (
+    COVERS,
+    bounding_box,
+    choose_person,
+    disc,
+    find_people,
+    isolate,
+    occupancy,
+)
+from motion_transfer.errors import InputError
+from motion_transfer.media.iuv.formats import ChannelOrder
+from motion_transfer.media.iuv.opening import read_single_iuv
+from motion_transfer.media.nearest import take_nearest
+from motion_transfer.media.pictures.photo import Photo
+from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
+from nhrr_core.iuv import ALL_PARTS, PART_NAMES
+
+BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
+CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
+TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
+SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
+SOLID_ALPHA = 192  # of 255; less is mixed with the background
+GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
+
+
+@dataclass(frozen=True)
+class SourcePicture:
+    """One person in one photo, and what is taken from there.
+
+    Attributes:
+        photo: The picture, upright.
+        iuv: (I, U, V) of this person only; 0 elsewhere.
+        alpha: How much of each pixel is this person, 0..255, where somebody could tell; None: the
+            photo's own alpha says it, or else its colours.
+        parts: What is taken; the person of a run gives what no garment covers.
+    """
+
+    photo: Photo
+    iuv: UInt8[np.ndarray, "H W 3"]
+    alpha: UInt8[np.ndarray, "H W"] | None = None
+    parts: tuple[int, ...] = ALL_PARTS
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a renderer needs to know of a source.
+
+    Attributes:
+        photo: The picture, upright.
+        iuv: H x W x 3 uint8, of the chosen person only.
+        iuv_path: None where it was estimated.
+        texture: 1 x 3 x T x T in [-1, 1], 0 where nothing is seen.
+        visibility: 1 x 1 x T x T, 1 where the texture is seen.
+        alpha: How much of each pixel is the person, 0..255, where the IUV was estimated.
+        clearance: Of clothes and hair, see `nhrr_core.unfold_clearance`; 0 where it is not known.
+    """
+
+    photo: Photo
+    iuv: UInt8[np.ndarray, "H W 3"]
+    iuv_path: Path | None
+    texture: Float[Tensor, "1 3 T T"]
+    visibility: Float[Tensor, "1 1 T T"]
+    alpha: UInt8[np.ndarray, "H W"] | None = None
+    clearance: Float[Tensor, "1 2 128 128"] | None = None
+
+
+def unfold_source(
+    pictures: Sequence[SourcePicture], texture_size: int, iuv_path: Path | None = None
+) -> Source:
+    """Unfold what photos show into one source.
+
+    Args:
+        pictures: The person, then garments; later ones win where two give the same part.
+        texture_size: Side of the partial texture in texels.
+        iuv_path: Where the person's IUV was read; None where it was estimated.
+    Raises: InputError for a garment photo that shows none of its parts.
+    """
+    layers = [unfold_picture(picture, texture_size) for picture in pictures]
+    for picture, (_, shown) in zip(pictures[1:], layers[1:], strict=True):
+        if picture.parts and not shown.any():
+            found = ", ".join(PART_NAMES[p] for p in np.unique(picture.iuv[..., 0]) if p)
+            raise InputError(
+                f"garment {picture.photo.path} shows none of"
+                f" {', '.join(PART_NAMES[p] for p in picture.parts)}; it shows {found}"
+            )
+    texture, visibility = merge_textures(layers)
+    clearances = [
+        clearance_of(picture.photo, picture.iuv, picture.parts, alpha=picture.alpha)
+        for picture in pictures
+    ]
+    clearance = torch.cat(merge_textures([(c[:, :1], c[:, 1:]) for c in clearances]), dim=1)
+    person = pictures[0]
+    return Source(person.photo, person.iuv, iuv_path, texture, visibility, person.alpha, clearance)
+
+
+def unfold_picture(
+    picture: SourcePicture, texture_size: int
+) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
+    """Unfold a photo, at its full resolution, into a partial texture in [-1, 1] and visibility."""
+    photo, iuv = picture.photo, picture.iuv
+    alpha = photo.alpha if picture.alpha is None else picture.alpha
+    box = bounding_box(iuv)
+    if not box.area:
+        blank = torch.zeros(1, 1, texture_size, texture_size)
+        return blank.expand(-1, 3, -1, -1), blank
+    # nothing farther away is looked at: of a large photo that saves most of the work
+    margin = round((box.height - 1) * SURROUNDINGS_SHARE)
+    body = np.s_[
+        max(0, box.top - margin) : box.bottom + margin,
+        max(0, box.left - margin) : box.right + margin,
+    ]
+    rgb, own = np.ascontiguousarray(photo.rgb[body]), np.ascontiguousarray(iuv[body])
+    trimmed = trim_outline(rgb, own) if alpha is None else trim_to_alpha(own, alpha[body])
+    tensors = [torch.from_numpy(image).permute(2, 0, 1)[None] for image in (rgb, trimmed)]
+    colours, body_iuv = tensors[0].float() / 127.5 - 1, keep_parts(tensors[1], picture.parts)
+    return extract_texture(colours, body_iuv, load_uv_layout().charts, texture_size)
+
+
+def trim_to_alpha(
+    iuv: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Keep the IUV where alpha is solid, but for the outermost pixels, where colours mix."""
+    solid = (alpha >= SOLID_ALPHA).astype(np.uint8)
+    # what the photo's edge cuts off does not mix with a background
+    reach = disc(bounding_box(iuv).height * TRIM_SHARE)
+    return iuv * cv2.erode(solid, reach, borderValue=1)[..., None]
+
+
+def trim_outline(
+    rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Take the background that strays into an outline out of its IUV.
+
+    Only a band along the outline is doubted. In it, GrabCut (Rother et al., SIGGRAPH 2004) decides
+    by colour, and the outermost pixels, where photo and outline mix, always go. What lies just
+    outside may be hair: the background's colours are those farther away.
+    """
+    mask = occupancy(iuv)
+    height = bounding_box(iuv).height
+    if not height:
+        return iuv
+    scale = min(1, GRABCUT_HEIGHT / height)
+    small = max(1, round(mask.shape[1] * scale)), max(1, round(mask.shape[0] * scale))
+    labels = _cut_out(
+        cv2.resize(rgb, small, interpolation=cv2.INTER_AREA),
+        cv2.resize(mask, small, interpolation=cv2.INTER_NEAREST),
+        height * scale,
+    )
+    person = mask & cv2.resize(labels, mask.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    return iuv * cv2.erode(person, disc(height * TRIM_SHARE))[..., None]
+
+
+def _cut_out(
+    rgb: UInt8[np.ndarray, "H W 3"], mask: UInt8[np.ndarray, "H W"], height: float
+) -> UInt8[np.ndarray, "H W"]:
+    """Mark with 1 where a person of that height, px, is, by colour along a rough mask's outline."""
+    band = height * BAND_SHARE
+    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 3)
+    thickness = cv2.dilate(depth, disc(band))
+    inner = depth >= np.minimum(band, thickness / 2)  # a limb thinner than the band keeps its core
+    near = cv2.dilate(mask, disc(height * CLEAR_SHARE)) > 0
+    if near.all():
+        return mask
+    labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
+    labels[inner & (mask > 0)] = cv2.GC_FGD
+    surroundings = np.where(mask[..., None], rgb, take_nearest(rgb, near))
+    return grab_cut(surroundings, labels)
+
+
+def read_person(
+    photo: Photo, path: Path, choice: str, order: ChannelOrder | None, what: str
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Read the IUV of one person in a photo, without pixels that the photo's alpha leaves out.
+
+    Args:
+        choice: `largest`, an index from the left (0 first), or a box `x0,y0,x1,y1` in px.
+        what: The photo's role, for messages.
+    Raises: InputError if the IUV cannot be read, is of another size, or shows nobody.
+    """
+    where = f"{what} IUV {path}"
+    iuv = read_single_iuv(path, order, f"{what} IUV")
+    if iuv is None:
+        raise InputError(f"{where}: no person in it, every pixel is background")
+    if iuv.shape[:2] != photo.rgb.shape[:2]:
+        height, width = photo.rgb.shape[:2]
+        hint = "make the IUV from this very photo"
+        if photo.turned and iuv.shape[1::-1] == (height, width):
+            hint = "the photo was turned upright as its EXIF says, make the IUV from it like that"
+        raise InputError(
+            f"{where} is {iuv.shape[1]} x {iuv.shape[0]}, but {photo.path} is {width} x {height};"
+            f" {hint}"
+        )
+    people = find_people(iuv)
+    person = choose_person(people, choice, where)
+    if not people.shows_only(person):
+        iuv = isolate(iuv, person)
+    if photo.alpha is not None:
+        iuv = iuv * (photo.alpha >= COVERS)[..., None]
+    return iuv

@@ -1,0 +1,127 @@
+"""The estimator that needs no model of the user's: BlazePose finds people, and a small network of
+this project paints their IUV from landmarks and mask."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float32, UInt8
+
+from motion_transfer.drawing.person import Box
+from motion_transfer.estimate.blazepose.networks import SeenBody
+from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
+from motion_transfer.estimate.blazepose.tracker import BodyTracker
+from motion_transfer.estimate.interface import PersonEstimate, check_frame
+from motion_transfer.estimate.iuv.features import MASK_SIZE, body_input, body_window
+from motion_transfer.estimate.iuv.network import IuvNetwork, load_shipped, shipped_file
+from motion_transfer.estimate.iuv.painting import paint_iuv
+from motion_transfer.estimate.models import MODEL_FILES, digest
+
+__all__ = ["BlazePoseEstimator", "model_facts"]
+
+FAINT = 0.05  # of the mask, 0..1; less is nobody
+SOLID = 0.5  # of the mask; what the painting network's window is laid around
+
+
+class BlazePoseEstimator:
+    """What turns frames into people; one object serves one thread, and one shot after another.
+
+    Args:
+        network: Paints IUV; None means the weights that ship.
+        most_people: How many are followed at once.
+        smooth: Whether to smooth landmarks between frames; for photos that have nothing to do with
+            each other call `start_shot` before each, or turn it off.
+        frame_rate: Frames per second, for smoothing.
+        threads: Of each of BlazePose's networks; the painting network uses torch's.
+        fit: Gives everybody other proportions, before their IUV is painted.
+    Raises: InputError where the models or their package are missing; WeightsError.
+    """
+
+    def __init__(
+        self,
+        *,
+        network: IuvNetwork | None = None,
+        most_people: int = 4,
+        smooth: bool = True,
+        frame_rate: float = 30.0,
+        threads: int = 1,
+        fit: BodyFit | None = None,
+    ) -> None:
+        self._tracker = BodyTracker(
+            most_people=most_people, smooth=smooth, frame_rate=frame_rate, threads=threads
+        )
+        self._network = network.fused() if network else load_shipped()
+        self._fit = fit
+
+    def start_shot(self) -> None:
+        """Forget who was where."""
+        self._tracker.start_shot()
+
+    def estimate(self, frame: UInt8[np.ndarray, "H W 3"]) -> list[PersonEstimate]:
+        """Find the people of the next frame, the longest known first; maybe nobody.
+
+        Raises: InputError if the frame is no RGB picture.
+        """
+        check_frame(frame)
+        seen = self._tracker.follow(np.ascontiguousarray(frame))
+        people = [self._paint(number, body, *frame.shape[:2]) for number, body in seen]
+        return [person for person in people if person is not None]
+
+    def _paint(self, number: int, body: SeenBody, height: int, width: int) -> PersonEstimate | None:
+        if self._fit is not None:
+            body = fit_body(body, self._fit)
+        box = _box_on_frame(body, height, width, FAINT)
+        if box is None:
+            return None
+        window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
+        # the network shrinks the mask to its own size: no need to see it much finer
+        mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
+        with torch.inference_mode():
+            logits = self._network(body_input(body.landmarks, mask, window))
+            iuv = paint_iuv(logits, window, box)
+        return PersonEstimate(
+            track=number,
+            box=box,
+            iuv=iuv,
+            alpha=body.region.paste(np.rint(body.mask * 255).astype(np.uint8), box),
+            confidence=body.presence,
+            landmarks=body.landmarks,
+        )
+
+
+def model_facts(_model: None = None) -> dict[str, Any]:
+    """Tell what decides the answers, for keys of content: the models, and the network's weights."""
+    network = shipped_file()
+    return {
+        "models": [file.sha256 for file in MODEL_FILES],
+        "network": digest(network.read_bytes()) if network.is_file() else None,
+    }
+
+
+def _box_on_frame(body: SeenBody, height: int, width: int, level: float) -> Box | None:
+    """Find the box of the frame that holds what a body's mask covers; None if that is nothing."""
+    rows, columns = np.nonzero(body.mask > level)
+    if not len(rows):
+        return None
+    ends = np.array([[columns.min(), rows.min()], [columns.max() + 1, rows.max() + 1]], np.float32)
+    # all four corners, as the region may be turned
+    corners = np.array([[x, y] for x in ends[:, 0] for y in ends[:, 1]], np.float32)
+    on_frame = body.region.to_frame(corners / body.mask.shape[0])
+    low = np.floor(on_frame.min(0)).clip(0).astype(int)
+    high = np.ceil(on_frame.max(0)).astype(int).clip(max=(width, height))
+    if (high <= low).any():
+        return None
+    return Box(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+
+
+def _mask_in(body: SeenBody, window: Box, size: int) -> Float32[np.ndarray, "size size"]:
+    """Look at the mask in a window, at size x size."""
+    scale = size / window.width
+    to_mask = cv2.invertAffineTransform(body.region.matrix(body.mask.shape[0]))
+    to_frame = np.array([[1 / scale, 0, window.left], [0, 1 / scale, window.top], [0, 0, 1]])
+    to_frame[:2, 2] += 0.5 / scale - 0.5  # OpenCV's whole numbers are pixel centres
+    way = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return cv2.warpAffine(body.mask, (to_mask @ to_frame)[:2], (size, size), flags=way)

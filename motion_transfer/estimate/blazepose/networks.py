@@ -1,0 +1,266 @@
+"""BlazePose's two networks, TensorFlow Lite models run on the CPU: the detector and the landmarks.
+
+The detector looks at 224 x 224 pixels of a frame and says for each of 2,254 anchors whether
+somebody's face and trunk are there, where, and how large the circle around the whole body is. The
+landmark model looks at one person: 33 points in the picture and in metres, and the person's mask.
+
+Source: Bazarevsky et al., BlazePose (2020); anchors, decoder's numbers and how outputs are read are
+those of MediaPipe's graphs `pose_detection_cpu` and `pose_landmark_by_roi_cpu` (0.10.14).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from motion_transfer.errors import InputError
+from motion_transfer.estimate.blazepose.region import Region
+from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
+from motion_transfer.extras import require_extra
+
+DETECTOR_SIZE = 224
+STRIDES = (8, 16, 32, 32, 32)
+ANCHORS_A_CELL = 2  # per layer: one, and one at the scale between it and the next
+SCORE_LIMIT = 100.0
+LEAST_SCORE = 0.5
+SAME_PERSON = 0.3  # overlap (intersection over union) from which two boxes are one person
+
+LANDMARKS_SIZE = 256
+LEAST_PRESENCE = 0.5  # a smaller chance that a body is there means that there is none
+REFINED_RADIUS = 3  # cells: a landmark is refined by its heat map's 7 x 7 cells around it,
+REFINED_FROM = 0.5  # where one of them is at least this hot
+
+
+class LiteModel:
+    """A model with one input; keeps its own buffers, so that one object serves one thread.
+
+    Raises: InputError if the file is no such model, or the package that runs it is missing.
+    """
+
+    def __init__(self, path: Path, threads: int) -> None:
+        require_extra("estimate")
+        from ai_edge_litert.interpreter import Interpreter
+
+        try:
+            with _quiet():
+                self._interpreter = Interpreter(model_path=str(path), num_threads=threads)
+                self._interpreter.allocate_tensors()
+        except (ValueError, RuntimeError) as error:
+            raise InputError(
+                f"{path} is not a model that can be run ({error}); `mt models fetch --force`"
+                " fetches it anew"
+            ) from error
+        self._input = self._interpreter.get_input_details()[0]["index"]
+        self._outputs = self._interpreter.get_output_details()
+
+    def run(self, image: Float32[np.ndarray, "H W 3"]) -> list[np.ndarray]:
+        """Compute the outputs in the model's order, without their first axis (a batch of one)."""
+        self._interpreter.set_tensor(self._input, image[None])
+        self._interpreter.invoke()
+        return [self._interpreter.get_tensor(output["index"])[0] for output in self._outputs]
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the run-time's remark about its kernels, which native code writes, off stderr."""
+    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(nowhere)
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Somebody.
+
+    Attributes:
+        score: Chance that it is a person, 0..1.
+        region: What the landmark model should look at.
+    """
+
+    score: float
+    region: Region
+
+
+class PersonDetector:
+    """The detector; one object serves one thread."""
+
+    def __init__(self, model: Path, threads: int = 1) -> None:
+        self._model = LiteModel(model, threads)
+
+    def detect(
+        self,
+        frame: UInt8[np.ndarray, "H W 3"],
+        region: Region | None = None,
+        least_score: float = LEAST_SCORE,
+    ) -> list[Detection]:
+        """Find everybody in a frame of any size, or in one square of it, the most certain first.
+
+        Coordinates are the frame's.
+        """
+        height, width = frame.shape[:2]
+        region = region or Region(width / 2, height / 2, max(height, width))
+        seen = region.cut(frame, DETECTOR_SIZE, border=cv2.BORDER_CONSTANT)
+        raw, logits = self._model.run(seen.astype(np.float32) / 127.5 - 1)
+        found = []
+        for score, points in merge_overlapping(*decode(raw, logits[:, 0], least_score)):
+            found.append(Detection(score, Region.around_body(*region.to_frame(points[2:4]))))
+        return found
+
+
+@cache
+def anchor_centres() -> Float32[np.ndarray, "2254 2"]:
+    """List x and y of each anchor in [0, 1]; layers of the same stride share their cells."""
+    rows = []
+    for stride in sorted(set(STRIDES)):
+        cells = DETECTOR_SIZE // stride
+        each = ANCHORS_A_CELL * STRIDES.count(stride)
+        y, x = (np.mgrid[:cells, :cells] + 0.5) / cells
+        rows.append(np.repeat(np.stack([x.ravel(), y.ravel()], 1), each, axis=0))
+    return np.concatenate(rows).astype(np.float32)
+
+
+def decode(
+    raw: Float32[np.ndarray, "2254 12"], logits: Float32[np.ndarray, " 2254"], least_score: float
+) -> tuple[Float32[np.ndarray, " N"], Float32[np.ndarray, "N 6 2"]]:
+    """Read the network's output as scores and points, for the anchors that are certain enough.
+
+    Returns: Scores, and for each (left, top), (right, bottom) and four alignment points in [0, 1]
+        of the square: middle of the hips, circle of the body, middle of the shoulders, circle of
+        the upper body.
+    """
+    scores = 1 / (1 + np.exp(-logits.clip(-SCORE_LIMIT, SCORE_LIMIT).astype(np.float64)))
+    kept = np.flatnonzero(scores >= least_score)
+    points = raw[kept].reshape(-1, 6, 2) / DETECTOR_SIZE
+    # the first pair is the box's middle, from the anchor; the second its size
+    centre, size = points[:, 0] + anchor_centres()[kept], points[:, 1].copy()
+    points[:, 2:] += anchor_centres()[kept, None]
+    points[:, 0], points[:, 1] = centre - size / 2, centre + size / 2
+    return scores[kept].astype(np.float32), points
+
+
+def merge_overlapping(
+    scores: Float32[np.ndarray, " N"], points: Float32[np.ndarray, "N 6 2"]
+) -> list[tuple[float, Float32[np.ndarray, "6 2"]]]:
+    """Make one of each group of overlapping boxes: their mean weighted by score.
+
+    Source: weighted non-maximum suppression, Bazarevsky et al., BlazeFace (2019).
+    """
+    left = np.argsort(-scores, kind="stable")
+    merged = []
+    while len(left):
+        same = _overlaps(points[left[0]], points[left]) > SAME_PERSON
+        same[0] = True  # also where its box is empty, or the loop would not end
+        group = left[same]
+        weights = scores[group] / scores[group].sum()
+        merged.append((float(scores[left[0]]), np.einsum("n,nij->ij", weights, points[group])))
+        left = left[~same]
+    return merged
+
+
+def _overlaps(
+    one: Float32[np.ndarray, "6 2"], many: Float32[np.ndarray, "N 6 2"]
+) -> Float32[np.ndarray, " N"]:
+    low, high = np.maximum(one[0], many[:, 0]), np.minimum(one[1], many[:, 1])
+    shared = (high - low).clip(0).prod(-1)
+    areas = (many[:, 1] - many[:, 0]).prod(-1)
+    return shared / np.maximum(areas + (one[1] - one[0]).prod() - shared, 1e-9)
+
+
+@dataclass(frozen=True)
+class SeenBody:
+    """What the landmark model saw in a region.
+
+    Attributes:
+        presence: Chance that a body is there, 0..1.
+        landmarks: 33 points on the frame.
+        region: Where it looked.
+        mask: The person's share of each pixel of the region, 0..1.
+        next_region: Where to look in the next frame.
+    """
+
+    presence: float
+    landmarks: Landmarks
+    region: Region
+    mask: Float32[np.ndarray, "256 256"]
+    next_region: Region
+
+
+class LandmarkModel:
+    """The landmark model; one object serves one thread."""
+
+    def __init__(self, model: Path, threads: int = 1) -> None:
+        self._model = LiteModel(model, threads)
+
+    def locate(self, frame: UInt8[np.ndarray, "H W 3"], region: Region) -> SeenBody | None:
+        """Find the body in a region of the frame; None where there is none.
+
+        Of the network's 39 points 33 are landmarks and two span the region of the next frame; the
+        others serve the network's training.
+        """
+        if not region.is_usable:
+            return None
+        seen = region.cut(frame, LANDMARKS_SIZE, border=cv2.BORDER_REPLICATE)
+        points, presence, mask, heat, world = self._model.run(seen.astype(np.float32) / 255)
+        if (chance := float(presence[0])) < LEAST_PRESENCE:
+            return None
+        rows = points.reshape(-1, 5)  # x, y, depth, and two chances
+        on_frame = region.to_frame(refine(rows[:, :2] / LANDMARKS_SIZE, heat))
+        depth = rows[:, 2:3] / LANDMARKS_SIZE * region.side
+        chances = _sigmoid(rows[:, 3:])
+        metres = world.reshape(-1, 3).copy()
+        metres[:, :2] = region.rotate(metres[:, :2])
+        kept = slice(LANDMARK_COUNT)
+        landmarks = Landmarks(
+            image=np.concatenate([on_frame, depth], 1)[kept].astype(np.float32),
+            world=metres[kept],
+            visibility=chances[kept, 0],
+            presence=chances[kept, 1],
+        )
+        next_region = Region.around_body(*on_frame[LANDMARK_COUNT : LANDMARK_COUNT + 2])
+        return SeenBody(chance, landmarks, region, _sigmoid(mask[..., 0]), next_region)
+
+
+def refine(
+    places: Float32[np.ndarray, "N 2"], heat: Float32[np.ndarray, "h w N"]
+) -> Float32[np.ndarray, "N 2"]:
+    """Move each point to the centre of gravity of its heat map nearby, where that is hot.
+
+    Args:
+        places: In [0, 1] of the region.
+        heat: Logits, one map for each point.
+    """
+    height, width, _ = heat.shape
+    refined = places.copy()
+    for index, (x, y) in enumerate(places):
+        column, row = int(x * width), int(y * height)
+        if not (0 <= column < width and 0 <= row < height):
+            continue
+        top, left = max(0, row - REFINED_RADIUS), max(0, column - REFINED_RADIUS)
+        near = heat[top : row + REFINED_RADIUS + 1, left : column + REFINED_RADIUS + 1, index]
+        near = _sigmoid(near)
+        if near.max() < REFINED_FROM:
+            continue
+        rows, columns = np.indices(near.shape)
+        total = near.sum()
+        refined[index] = (
+            (near * (columns + left)).sum() / total / width,
+            (near * (rows + top)).sum() / total / height,
+        )
+    return refined
+
+
+def _sigmoid(logits: np.ndarray) -> np.ndarray:
+    return (1 / (1 + np.exp(-logits.clip(-60, 60)))).astype(np.float32)  # exp(60) fits float32

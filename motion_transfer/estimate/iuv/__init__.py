@@ -1,0 +1,1 @@
+"""The network that paints a person's IUV from landmarks and mask."""

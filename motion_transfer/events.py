@@ -1,0 +1,60 @@
+"""What long work says of itself: the command line draws it, `--json` prints it, pages show it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Started:
+    """The input is accepted: what will be rendered, and how."""
+
+    renderer: str
+    frame_count: int
+    width: int
+    height: int
+    frame_rate: str
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A step of known length begins (`compare`, `estimate`, `scan` or `render`)."""
+
+    name: str
+    frame_count: int
+
+
+@dataclass(frozen=True)
+class FramesDone:
+    """So many more frames of the current stage are finished."""
+
+    frame_count: int
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something the user should know, though the work goes on."""
+
+    message: str
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The output has its final name."""
+
+    output: Path
+    frame_count: int
+    duration_seconds: float
+    renderer: str
+    wall_seconds: float
+    render_seconds: float
+
+
+Event = Started | Stage | FramesDone | Notice | Finished
+Listener = Callable[[Event], None]
+
+
+def ignore(_event: Event) -> None:
+    """Hear an event and do nothing."""

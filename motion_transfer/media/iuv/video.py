@@ -1,0 +1,135 @@
+"""IUV in a lossless video.
+
+What a lossy codec or a conversion to YUV did to part indices cannot be undone, so that such a video
+is refused. So is one that breaks off or is damaged inside: decoders show something all the same.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import av.logging
+from av.container import InputContainer
+from av.error import FFmpegError
+
+from motion_transfer.errors import IuvFileError
+from motion_transfer.media.iuv.lookalikes import explain_picture
+from motion_transfer.media.iuv.stream import IuvStream, Raw
+from motion_transfer.media.pictures.video import pick_frames
+
+LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
+LOSSLESS_REMEDY = (
+    "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt bgr0 out.mkv`"
+)
+
+# A decoder that meets damage conceals it, returns wrong pixels and only logs an error. Errors have
+# to reach Python for `_decode_intact` to hear of them, and nobody else needs to.
+av.logging.set_level(av.logging.ERROR)
+logging.getLogger("libav").addHandler(logging.NullHandler())
+
+
+class VideoStream(IuvStream):
+    """A lossless RGB video. Raises: IuvFileError for a lossy codec or a YUV pixel format."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            with av.open(str(path)) as container:
+                if not container.streams.video:
+                    raise IuvFileError(f"driver {path} has no video in it")
+                stream = container.streams.video[0]
+                codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
+                _check_lossless(path, container, codec, pixels)
+                # frames are found by these times: containers differ in how they count frames
+                times = sorted(
+                    (packet.pts, packet.duration or 0)
+                    for packet in container.demux(stream)
+                    if packet.pts is not None
+                )
+                self._timestamps = [pts for pts, _ in times]
+                rate = stream.average_rate or stream.guessed_rate
+                if times and rate and stream.time_base:
+                    last, duration = (ticks * stream.time_base for ticks in times[-1])
+                    # Matroska does not always say how long the last frame is shown
+                    _check_whole(path, container, last + (duration or 1 / rate), 1 / rate)
+        except FFmpegError as error:
+            raise IuvFileError(
+                f"driver {path} is not a readable video: {error.strerror}"
+            ) from error
+        if not self._timestamps:
+            raise IuvFileError(f"driver {path} holds no frames")
+        super().__init__(path, f"IUV video ({codec}, {pixels})", len(self._timestamps))
+        self.frame_rate = Fraction(rate) if rate else None
+
+    def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
+        index = start
+        try:
+            with av.open(str(self.path)) as container:
+                stream = container.streams.video[0]
+                stream.codec_context.thread_count = 1  # chunks are read in parallel already
+                wanted = self._timestamps[start:stop]
+                container.seek(wanted[0], stream=stream, backward=True)
+                for frame in pick_frames(_decode_intact(container, stream), wanted):
+                    yield frame.to_ndarray(format="rgb24")
+                    index += 1
+        except (FFmpegError, _DamagedError) as error:
+            reason = error.strerror if isinstance(error, FFmpegError) else error
+            raise IuvFileError(
+                f"{self.where(index)} is damaged ({reason}); export it again"
+            ) from error
+        if index < stop:
+            raise IuvFileError(f"{self.where(index)} cannot be decoded; export the driver again")
+
+
+class _DamagedError(Exception):
+    """A decoder complained about a frame."""
+
+
+def _decode_intact(container: InputContainer, stream: av.VideoStream) -> Iterator[av.VideoFrame]:
+    """Decode frames as long as the decoder does not complain; in this thread only."""
+    frames = container.decode(stream)
+    while True:
+        with av.logging.Capture() as complaints:
+            frame = next(frames, None)
+        if complaints:
+            raise _DamagedError(complaints[0][2].strip())
+        if frame is None:
+            return
+        yield frame
+
+
+def _check_lossless(path: Path, container: InputContainer, codec: str, pixels: str) -> None:
+    if codec not in LOSSLESS_CODECS:
+        known = _explain_first_frame(container)
+        if known:
+            raise IuvFileError(f"driver {path} is not IUV: {known}")
+        raise IuvFileError(
+            f"driver {path} is compressed with {codec}, which destroys part indices;"
+            f" {LOSSLESS_REMEDY}"
+        )
+    if not any(mark in pixels for mark in ("rgb", "bgr", "gbr")):
+        raise IuvFileError(
+            f"driver {path} stores {pixels} pixels, and the conversion to them already destroyed"
+            f" part indices; {LOSSLESS_REMEDY}"
+        )
+
+
+def _explain_first_frame(container: InputContainer) -> str | None:
+    """Tell what the pictures of a lossy video are, if they are often mistaken for IUV."""
+    frame = next(container.decode(video=0), None)
+    return None if frame is None else explain_picture(frame.to_ndarray(format="rgb24"))
+
+
+def _check_whole(
+    path: Path, container: InputContainer, end_seconds: Fraction, frame_seconds: Fraction
+) -> None:
+    """Compare where packets end with the length in the header: Matroska breaks off silently."""
+    promised_seconds = Fraction(container.duration or 0, av.time_base)
+    if len(container.streams) == 1 and promised_seconds > end_seconds + frame_seconds / 2:
+        raise IuvFileError(
+            f"driver {path} is truncated: it should last {float(promised_seconds):.2f} s, but ends"
+            f" after {float(end_seconds):.2f} s; export it again"
+        )

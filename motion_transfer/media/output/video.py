@@ -1,0 +1,143 @@
+"""Output as video: each segment one closed group of pictures, joined by copying packets.
+
+Every segment has a single-threaded encoder of its own, since the bytes of a threaded one depend on
+the number of cores. Time inside segments is counted in frames, exactly.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from itertools import count
+from pathlib import Path
+from typing import Any, cast
+
+import av
+import numpy as np
+from av.container import InputContainer
+from av.error import FFmpegError
+from av.video.codeccontext import VideoCodecContext
+from av.video.reformatter import ColorRange, Colorspace, Interpolation
+from jaxtyping import UInt8
+
+from motion_transfer.errors import OutputError
+from motion_transfer.media.output.audio import AudioCut, AudioTrack
+from motion_transfer.media.output.formats import CONTAINERS, OutputFormat
+from motion_transfer.media.output.segments import Segments, WriteFrame
+
+SEGMENT_CONTAINER = "nut"  # takes every codec, and any frame rate without rounding
+LONGEST_GROUP = 10_000  # frames; longer than any chunk, so that a segment is one group of pictures
+BT709 = 1  # H.273's number for primaries, transfer and matrix
+os.environ.setdefault("SVT_LOG", "0")  # the AV1 encoder greets on stderr otherwise
+
+
+@contextmanager
+def open_segment(
+    path: Path, output_format: OutputFormat, *, size: tuple[int, int], rate: Fraction, **_: object
+) -> Iterator[WriteFrame]:
+    """Open a closed group of pictures in an intermediate container; scene cuts may begin more.
+
+    Raises: OutputError if the encoder refuses that size or rate.
+    """
+    codec = output_format.codec
+    options = dict(codec.options)
+    if output_format.crf is not None:
+        options["crf"] = str(output_format.crf)
+    conversion: dict[str, Any] = {"format": codec.pixel_format}
+    if not codec.keeps_rgb:
+        conversion["dst_colorspace"] = Colorspace.ITU709
+        conversion["dst_color_range"] = ColorRange.MPEG
+        conversion["interpolation"] = Interpolation.AREA
+    with av.open(str(path), "w", format=SEGMENT_CONTAINER) as container:
+        stream = container.add_stream(codec.encoder, rate=rate, options=options)
+        stream = cast(av.VideoStream, stream)
+        stream.width, stream.height = size
+        stream.pix_fmt = codec.pixel_format
+        context = stream.codec_context
+        context.thread_count = 1
+        context.time_base = 1 / rate
+        context.gop_size = LONGEST_GROUP
+        if not codec.keeps_rgb:
+            _tag_bt709(context)
+        try:
+            context.open()
+        except FFmpegError as error:
+            raise OutputError(
+                f"{codec.encoder} cannot encode {size[0]} x {size[1]} at {rate} frames/s"
+                f" ({error.strerror}); choose another --codec or --fps"
+            ) from error
+        numbers = count()
+
+        def write(frame: UInt8[np.ndarray, "H W 3"]) -> None:
+            picture = av.VideoFrame.from_ndarray(frame, format="rgb24").reformat(**conversion)
+            picture.pts, picture.time_base = next(numbers), context.time_base
+            container.mux(stream.encode(picture))
+
+        yield write
+        container.mux(stream.encode(None))
+
+
+def join_segments(
+    segments: Segments,
+    destination: Path,
+    output_format: OutputFormat,
+    rate: Fraction,
+    audio: AudioCut | None,
+) -> None:
+    """Copy the packets of segments into one container, and lay sound between them."""
+    container = CONTAINERS[destination.suffix]
+    options = {"fflags": "+bitexact"}  # or Matroska's are marked with random numbers
+    if container.is_mp4:
+        options["movflags"] = "+faststart"
+    orders = [_showing_order(path, rate) for path, _ in segments]
+    # a frame is decoded before it is shown: decoding begins as much earlier as one ever needs
+    delay = max(index - number for order in orders for index, number in enumerate(order))
+    with av.open(str(destination), "w", options=options) as output:
+        stream = sound = None
+        first = 0
+        for (path, frame_count), order in zip(segments, orders, strict=True):
+            with av.open(str(path)) as segment:
+                template = segment.streams.video[0]
+                if stream is None:
+                    stream = output.add_stream_from_template(template, opaque=True)
+                    stream.time_base = 1 / rate
+                    if not output_format.codec.keeps_rgb:
+                        _tag_bt709(stream.codec_context)  # VP9 does not carry all of it itself
+                    if output_format.codec.tag and container.is_mp4:
+                        stream.codec_context.codec_tag = output_format.codec.tag
+                    if audio is not None:
+                        sound = AudioTrack(audio, output, container.audio)
+                for index, (packet, number) in enumerate(
+                    zip(_packets(segment), order, strict=True)
+                ):
+                    packet.pts = first + number
+                    packet.dts = first + index - delay
+                    packet.duration = 1
+                    packet.time_base = 1 / rate
+                    packet.stream = stream
+                    if sound is not None:
+                        sound.write_until((first + index) / rate)
+                    output.mux(packet)
+            first += frame_count
+        if sound is not None:
+            sound.write_until(None)
+
+
+def _tag_bt709(context: VideoCodecContext) -> None:
+    context.colorspace = context.color_primaries = context.color_trc = BT709
+    context.color_range = ColorRange.MPEG
+
+
+def _showing_order(path: Path, rate: Fraction) -> list[int]:
+    """List the frame number in its segment of each packet, in decoding order."""
+    with av.open(str(path)) as segment:
+        numbers = [round((p.pts or 0) * p.time_base * rate) for p in _packets(segment)]
+    start = min(numbers)  # the container shifts time so that decoding begins at 0
+    return [number - start for number in numbers]
+
+
+def _packets(segment: InputContainer) -> Iterator[av.Packet]:
+    """Read packets in decoding order, one a frame, without the empty one that flushes decoders."""
+    return (packet for packet in segment.demux(video=0) if packet.size)

@@ -1,0 +1,173 @@
+"""What every clip of pictures offers: upright frames of one size at a constant rate, one by one.
+
+A varying rate becomes its mean: each output frame is the one that is on the screen in the middle of
+its time, so that frames are repeated or left out and nothing drifts from the sound.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from jaxtyping import UInt8
+
+from motion_transfer.errors import InputError
+from motion_transfer.media.pictures.photo import read_photo
+
+Frame = UInt8[np.ndarray, "H W 3"]
+Ticks = int | Fraction
+Shown = TypeVar("Shown")
+
+DEFAULT_RATE = Fraction(30)
+"""Frames per second where nothing tells a rate."""
+
+LARGEST_DENOMINATOR = 1001
+"""Limit for the mean of a varying rate; 1001 is what broadcast rates such as 30000/1001 need, and
+any longer fraction is no better."""
+
+STEADY = Fraction(1, 2)
+"""Share of a frame's time by which a frame of a constant rate may be away from its place."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When the output's frames are shown.
+
+    Attributes:
+        rate: Frames per second.
+        count: How many frames there are.
+        start_seconds: When the first one is shown.
+        constant: Whether the file has this rate itself.
+    """
+
+    rate: Fraction
+    count: int
+    start_seconds: Fraction
+    constant: bool
+
+
+class PictureStream(ABC):
+    """RGB frames of one size.
+
+    Attributes:
+        frame_rate: The rate of the frames, or None where they come without one.
+        start_seconds: When the first frame is shown, on the clock of the file's sound.
+        notes: What the user should know of how this clip is read, in sentences.
+    """
+
+    def __init__(self, path: Path, frame_count: int, height: int, width: int) -> None:
+        self.path = path
+        self.frame_count = frame_count
+        self.height = height
+        self.width = width
+        self.frame_rate: Fraction | None = None
+        self.start_seconds = Fraction(0)
+        self.notes: tuple[str, ...] = ()
+
+    @abstractmethod
+    def read(self) -> Iterator[Frame]:
+        """Read every frame in order. Raises: InputError naming the frame that is broken."""
+
+    def where(self, index: int) -> str:
+        """Name the place of a frame, for messages."""
+        return f"frame {index} of {self.path}"
+
+    def _take_timing(self, timing: Timing) -> None:
+        """Have the rate and the beginning of a timing, and say so if the file's rate varies."""
+        self.frame_rate, self.start_seconds = timing.rate, timing.start_seconds
+        if not timing.constant:
+            self.notes = (
+                f"{self.path} has a varying frame rate; it is read at its mean, {timing.rate}"
+                f" ({float(timing.rate):.2f}) frames/s, by repeating and leaving out frames",
+            )
+
+    def _check_size(
+        self,
+        picture: Frame,
+        index: int,
+        first: str = "the first picture is",
+        remedy: str = "pictures of one clip need one size, give others one by one",
+    ) -> Frame:
+        """Hold a frame to the size of the first one. Raises: InputError."""
+        if picture.shape[:2] != (self.height, self.width):
+            raise InputError(
+                f"{self.where(index)} is {picture.shape[1]} x {picture.shape[0]}, but {first}"
+                f" {self.width} x {self.height}; {remedy}"
+            )
+        return picture
+
+
+class PhotoStream(PictureStream):
+    """One photo, or several of one size, turned upright as their EXIF says.
+
+    Where photos are transparent, white shows.
+    """
+
+    def __init__(self, path: Path, files: list[Path] | None = None) -> None:
+        """Raises: InputError if the first photo cannot be read."""
+        self._files = files or [path]
+        first = read_photo(self._files[0], "picture")
+        super().__init__(path, len(self._files), *first.rgb.shape[:2])
+
+    def read(self) -> Iterator[Frame]:
+        for index, file in enumerate(self._files):
+            yield self._check_size(read_photo(file, "picture").on_white(), index)
+
+    def where(self, index: int) -> str:
+        return f"frame {index}, {self._files[index]}" if self.path.is_dir() else str(self.path)
+
+
+def plan_timing(
+    times: Sequence[tuple[Ticks | None, Ticks]], base: Fraction, rate: Fraction | None, path: Path
+) -> Timing:
+    """Plan the output's frames from the times of the file's.
+
+    Args:
+        times: When each frame is shown, if the file says, and for how long, in units of `base`.
+        base: The length of a tick, seconds.
+        rate: What the container says, if anything.
+        path: The file, for messages.
+    Raises: InputError if there are no frames.
+    """
+    if not times:
+        raise InputError(f"video {path} holds no frames")
+    known = sorted((pts, duration) for pts, duration in times if pts is not None)
+    if len(known) < len(times):  # no clock in the file: its frames follow each other
+        return Timing(rate or DEFAULT_RATE, len(times), Fraction(0), constant=True)
+    start, last = known[0][0] * base, known[-1][0] * base
+    if rate and all(
+        abs(pts * base - start - index / rate) < STEADY / rate
+        for index, (pts, _) in enumerate(known)
+    ):
+        return Timing(rate, len(known), start, constant=True)
+    if last == start:
+        return Timing(rate or DEFAULT_RATE, len(known), start, constant=True)
+    mean = ((len(known) - 1) / (last - start)).limit_denominator(LARGEST_DENOMINATOR)
+    mean = max(mean, Fraction(1, LARGEST_DENOMINATOR))  # a slower one would be rounded to none
+    length = last - start + (known[-1][1] * base or 1 / mean)
+    return Timing(mean, max(1, round(length * mean)), start, constant=False)
+
+
+def show_steadily(frames: Iterable[tuple[Fraction, Shown]], timing: Timing) -> Iterator[Shown]:
+    """Yield for each output frame the one that is on the screen in the middle of its time.
+
+    Args:
+        frames: Pairs of when a frame is shown, in seconds, and the frame, in order.
+    """
+    frame_seconds = 1 / timing.rate
+    middle = timing.start_seconds + frame_seconds / 2
+    shown: Shown | None = None
+    index = 0
+    for begins, frame in frames:
+        while index < timing.count and shown is not None and begins > middle:
+            yield shown
+            index, middle = index + 1, middle + frame_seconds
+        shown = frame
+    for _ in range(index, timing.count):
+        if shown is not None:
+            yield shown

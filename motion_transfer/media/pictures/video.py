@@ -1,0 +1,178 @@
+"""Videos as people film them, in any container and codec that FFmpeg reads.
+
+`FilmedVideo` is read from beginning to end, as a clip to work on; `IndexedVideo` gives any frame by
+its number, to look at.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from av.container import InputContainer
+from av.error import FFmpegError
+from jaxtyping import Int32
+
+from motion_transfer.errors import InputError
+from motion_transfer.media.pictures.stream import (
+    Frame,
+    PictureStream,
+    plan_timing,
+    show_steadily,
+)
+
+
+class IndexedVideo:
+    """A video whose frames are read by number, from any thread."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises: InputError if the file is missing, is no video, or holds no frames."""
+        self.path = path
+        if not path.is_file():
+            raise InputError(f"video {path} does not exist")
+        with _opened(path, lambda reason: f"{path} is not a readable video: {reason}") as video:
+            packets = video[0].demux(video[1])
+            self._timestamps = sorted(p.pts for p in packets if p.pts is not None)
+        if not self._timestamps:
+            raise InputError(f"video {path} holds no frames")
+
+    @property
+    def frame_count(self) -> int:
+        return len(self._timestamps)
+
+    def read(self, index: int) -> Frame:
+        """Read one frame, RGB. Raises: InputError naming the frame that cannot be decoded."""
+        wanted = self._timestamps[index]
+        where = f"frame {index} of {self.path}"
+        with _opened(self.path, lambda reason: _damaged(where, reason)) as (container, stream):
+            container.seek(wanted, stream=stream, backward=True)
+            for frame in pick_frames(container.decode(stream), [wanted]):
+                return frame.to_ndarray(format="rgb24")
+        raise InputError(f"{where} cannot be decoded; export it again")
+
+
+class FilmedVideo(PictureStream):
+    """A video as a clip: upright, and at a constant rate."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises: InputError if it is no video, or has no frames that can be decoded."""
+
+        def refuse(reason: str | None) -> str:
+            return f"{path} is neither a picture nor a video that can be read: {reason}"
+
+        with _opened(path, refuse) as (container, stream):
+            rate = stream.average_rate or stream.guessed_rate
+            base = stream.time_base or Fraction(1)
+            times = [
+                (packet.pts, packet.duration or 0)
+                for packet in container.demux(stream)
+                if packet.size and not packet.is_discard  # an edit list hides some
+            ]
+        self._timing = plan_timing(times, base, rate and Fraction(rate), path)
+        self._clocked = all(pts is not None for pts, _ in times)
+        with _opened(path, refuse) as (container, stream):
+            first = next(container.decode(stream), None)
+            if first is None:
+                raise InputError(f"video {path} holds no frames")
+            self._matrix = _display_matrix(first)
+            height, width = turn_upright(first.to_ndarray(format="rgb24"), self._matrix).shape[:2]
+        super().__init__(path, self._timing.count, height, width)
+        self._take_timing(self._timing)
+
+    def read(self) -> Iterator[Frame]:
+        shown: av.VideoFrame | None = None
+        picture: Frame | None = None
+        index = 0
+        with _opened(self.path, lambda reason: _damaged(self.where(index), reason)) as video:
+            for frame in show_steadily(self._decode(*video), self._timing):
+                if picture is None or frame is not shown:  # repeated frames are converted once
+                    shown, picture = frame, self._upright(frame, index)
+                yield picture
+                index += 1
+        if shown is None:
+            raise InputError(f"video {self.path} holds no frames")
+
+    def _decode(
+        self, container: InputContainer, stream: av.VideoStream
+    ) -> Iterator[tuple[Fraction, av.VideoFrame]]:
+        """Decode frames, each with when it is shown, in seconds."""
+        stream.thread_type = "AUTO"
+        for number, frame in enumerate(container.decode(stream)):
+            if self._clocked and frame.pts is not None and frame.time_base is not None:
+                yield frame.pts * frame.time_base, frame
+            else:
+                yield self.start_seconds + number / self._timing.rate, frame
+
+    def _upright(self, frame: av.VideoFrame, index: int) -> Frame:
+        picture = turn_upright(frame.to_ndarray(format="rgb24"), self._matrix)
+        return self._check_size(picture, index, "the video began with", "export it in one size")
+
+
+def pick_frames(
+    frames: Iterable[av.VideoFrame], timestamps: Sequence[int]
+) -> Iterator[av.VideoFrame]:
+    """Pick the frames with these times, in order; end before the first that is not there.
+
+    Args:
+        frames: What is decoded after a seek, which goes to the key frame before.
+    """
+    left = deque(timestamps)
+    for frame in frames:
+        if frame.pts is None or frame.pts < left[0]:
+            continue
+        if frame.pts > left.popleft():
+            return  # the decoder dropped the one that is wanted, and another must not stand for it
+        yield frame
+        if not left:
+            return
+
+
+def turn_upright(picture: Frame, matrix: Int32[np.ndarray, "3 3"] | None) -> Frame:
+    """Turn a picture as a display matrix says: quarter turns and mirrors; others are left alone.
+
+    Convention: rows of the matrix say where the picture's x and y go, x to the right, y down.
+    """
+    if matrix is None:
+        return picture
+    (a, b), (c, d) = matrix[:2, :2].tolist()
+    if abs(b) > abs(a) and abs(c) > abs(d):
+        picture, a, d = picture.transpose(1, 0, 2), c, b
+    if a < 0:
+        picture = picture[:, ::-1]
+    if d < 0:
+        picture = picture[::-1]
+    return np.ascontiguousarray(picture)
+
+
+def _display_matrix(frame: av.VideoFrame) -> Int32[np.ndarray, "3 3"] | None:
+    """Find how the file asks to be shown, if it does."""
+    data = frame.side_data.get("DISPLAYMATRIX")
+    return None if data is None else np.frombuffer(bytes(data), np.int32).reshape(3, 3)
+
+
+def _damaged(where: str, reason: str | None) -> str:
+    return f"{where} is damaged ({reason}); export it again"
+
+
+@contextmanager
+def _opened(
+    path: Path, explain: Callable[[str | None], str]
+) -> Iterator[tuple[InputContainer, av.VideoStream]]:
+    """Open a file and its pictures; FFmpeg's refusals on the way become InputError.
+
+    Args:
+        explain: Puts FFmpeg's reason into a message.
+    """
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.video:
+                raise InputError(f"video {path} has no pictures in it")
+            stream = container.streams.video[0]
+            yield container, stream
+    except FFmpegError as error:
+        raise InputError(explain(error.strerror)) from error

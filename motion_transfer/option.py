@@ -1,0 +1,245 @@
+"""How an option is described once: for the command line, manifests, settings files and the API.
+
+A dataclass whose fields are made by `option` describes itself. The command line's flags and help
+(`motion_transfer.cli.options`), a manifest's fields and its JSON Schema
+(`motion_transfer.batch.manifest`) and the keys of a training run
+(`motion_transfer.training.config`) all follow from those descriptions. This module is light, so
+that help is instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from motion_transfer.errors import InputError
+
+Kind = Literal[
+    "path",
+    "paths",
+    "text",
+    "words",
+    "integer",
+    "number",
+    "rate",
+    "frames",
+    "flag",
+    "switch",
+    "garments",
+]
+Options = TypeVar("Options")
+
+LONGEST_RATE_TERM = 2**31 - 1
+"""FFmpeg's fractions (AVRational) hold no larger numerator or denominator."""
+
+RATE_DENOMINATOR = 100_000
+"""A decimal fraction with a longer term is replaced by the nearest one up to this denominator: the
+shortest that still tells 30000/1001 from its neighbours."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option, as a field of a dataclass describes it.
+
+    Attributes:
+        name: The field.
+        flags: On the command line. The first long one, without dashes, is its word in a manifest.
+        section: The heading under which help lists it.
+        kind: What is written. A `switch` is yes, no or undecided, a `flag` is off unless it is
+            given, `paths` and `words` may be given several times.
+        choices: Every allowed value, where there are few.
+        metavar: What help shows in the value's place.
+        in_manifest: Whether a job of a manifest may set it.
+        parse: Turns what was written into the field's value; raises InputError.
+    """
+
+    name: str
+    flags: tuple[str, ...]
+    section: str
+    help: str
+    kind: Kind
+    default: Any
+    required: bool
+    choices: tuple[str, ...]
+    metavar: str | None
+    in_manifest: bool
+    parse: Callable[[Any], Any]
+
+    @property
+    def word(self) -> str:
+        """The option's name in a manifest, such as `source_iuv`."""
+        if self.kind == "garments":
+            return self.name
+        long = next(flag for flag in self.flags if flag.startswith("--"))
+        return long.split("/")[0].removeprefix("--").replace("-", "_")
+
+    def read(self, written: Any) -> Any:
+        """The field's value for what was written, None for nothing. Raises: InputError."""
+        return self.default if written is None else self.parse(written)
+
+
+REQUIRED: Any = object()
+"""The default of an option that has to be given."""
+
+
+def option(
+    flags: str,
+    section: str,
+    help: str,
+    *,
+    kind: Kind = "text",
+    default: Any = None,
+    choices: tuple[str, ...] = (),
+    metavar: str | None = None,
+    in_manifest: bool = True,
+    parse: Callable[[Any], Any] | None = None,
+) -> Any:
+    """Make a dataclass field that carries its description.
+
+    Args:
+        flags: Separated by blanks, such as `-o --output`.
+        parse: Replaces what the kind does with a written value, see `PARSERS`.
+    """
+    words = {
+        "flags": tuple(flags.split()),
+        "section": section,
+        "help": help,
+        "kind": kind,
+        "default": None if default is REQUIRED else default,
+        "required": default is REQUIRED,
+        "choices": choices,
+        "metavar": metavar or "|".join(choices) or ("PATH" if kind == "path" else None),
+        "in_manifest": in_manifest,
+        "parse": parse or PARSERS.get(kind, _unchanged),
+    }
+    if default is REQUIRED:
+        return field(metadata=words)
+    return field(default=default, metadata=words)
+
+
+@cache
+def list_options(options_class: type) -> tuple[Option, ...]:
+    """List the described fields of a dataclass; other fields are left out.
+
+    They come in their order, or by section where the class has an order of `SECTIONS`.
+    """
+    described = [entry for entry in fields(options_class) if "flags" in entry.metadata]
+    entries = [Option(name=entry.name, **entry.metadata) for entry in described]
+    sections = getattr(options_class, "SECTIONS", ())
+    if sections:
+        entries.sort(key=lambda entry: sections.index(entry.section))
+    return tuple(entries)
+
+
+def options_from_words(options_class: type[Options], words: Mapping[str, Any]) -> Options:
+    """Build options from what was written, by field name.
+
+    Raises: InputError for a value that is none of its option's.
+    """
+    entries = {entry.name: entry for entry in list_options(options_class)}
+    return options_class(**{name: entries[name].read(value) for name, value in words.items()})
+
+
+def part_of(options: Any, part: type[Options]) -> Options:
+    """Take some options out of many: those that one of their base classes has.
+
+    Two runs whose parts are equal share whatever is made from that part alone.
+    """
+    return part(**{entry.name: getattr(options, entry.name) for entry in fields(part)})  # type: ignore[arg-type]
+
+
+def check_choices(options: Any) -> None:
+    """Check that options with few values have one of them. Raises: InputError naming the values."""
+    for entry in list_options(type(options)):
+        value = getattr(options, entry.name)
+        if entry.choices and value != entry.default and value not in entry.choices:
+            listed = ", ".join(entry.choices)
+            raise InputError(f"{entry.name} is {value!r}; supported are {listed}")
+
+
+def parse_colour(text: str) -> tuple[int, int, int] | None:
+    """Read the RGB of `white`, `black` or `#rrggbb`; None for `photo`. Raises: InputError."""
+    named = {"white": "#ffffff", "black": "#000000"}
+    code = named.get(text, text)
+    if code == "photo":
+        return None
+    try:
+        if len(code) != 7 or code[0] != "#":
+            raise ValueError
+        red, green, blue = bytes.fromhex(code[1:])
+    except ValueError:
+        raise InputError(
+            f"background {text!r}; supported are white, black, photo and #rrggbb"
+        ) from None
+    return red, green, blue
+
+
+def parse_range(text: str, what: str) -> tuple[int | None, int | None]:
+    """Read `10:50`, `10:`, `:50` or `12` as a half-open range that counts from 0.
+
+    Args:
+        what: Names what is counted, for messages.
+    Raises: InputError.
+    """
+    try:
+        if ":" not in text:
+            return int(text), int(text) + 1
+        start, stop = text.split(":")
+        ends = int(start) if start else None, int(stop) if stop else None
+    except ValueError:
+        raise InputError(f"{what} {text!r}; write START:STOP, such as 10:50, 10: or :50") from None
+    if any(end is not None and end < 0 for end in ends):
+        raise InputError(f"{what} {text!r}; {what} count from 0 and never from the end")
+    return ends
+
+
+def parse_frames(text: str | int) -> tuple[int | None, int | None]:
+    """Read a half-open range of frames, see `parse_range`. Raises: InputError."""
+    return parse_range(str(text), "frames")
+
+
+def parse_rate(text: str | float) -> Fraction:
+    """Read a rate in frames per second: `25`, `29.97` or `30000/1001`. Raises: InputError."""
+    try:
+        rate = Fraction(str(text))
+    except (ValueError, ZeroDivisionError):
+        raise InputError(
+            f"fps {str(text)!r}; write a number or a fraction, such as 30000/1001"
+        ) from None
+    if not 0 < rate <= 1000:
+        raise InputError(f"fps {str(text)!r}; it must lie between 0 and 1000")
+    if max(rate.numerator, rate.denominator) > LONGEST_RATE_TERM:
+        rate = rate.limit_denominator(RATE_DENOMINATOR)  # 29.97002997002997 is 30000/1001
+    if not rate:
+        raise InputError(f"fps {str(text)!r}; it is too slow for a video")
+    return rate
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read `384x512` as (width, height). Raises: InputError."""
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise InputError(f"size {text!r}; write WIDTHxHEIGHT, such as 256x256")
+    return int(width), int(height)
+
+
+def _unchanged(value: Any) -> Any:
+    return value
+
+
+def _paths(written: tuple[str, ...]) -> tuple[Path, ...]:
+    return tuple(Path(text) for text in written)
+
+
+PARSERS: dict[str, Callable[[Any], Any]] = {
+    "path": Path,
+    "paths": _paths,
+    "words": tuple,
+    "rate": parse_rate,
+    "frames": parse_frames,
+}
+"""What becomes of a written value, by its kind; other kinds are kept as they are written."""

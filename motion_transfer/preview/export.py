@@ -1,0 +1,106 @@
+"""Options written out again: as a command line, and as a manifest of one job."""
+
+from __future__ import annotations
+
+import glob
+import shlex
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from motion_transfer.media.iuv.formats import names_file
+from motion_transfer.option import Option, list_options
+from motion_transfer.render.options import NO_AUDIO, Garment, RenderOptions
+from motion_transfer.weights import SHIPPED
+from nhrr_core.iuv import PART_NAMES
+
+NAMES = ("audio", NO_AUDIO), *(("weights", name) for name in SHIPPED)
+"""Options and words that stand in a path's place and are none."""
+
+
+def command_line(options: RenderOptions) -> str:
+    """Write the `mt run` that does the same, for a POSIX shell."""
+    words = ["mt", "run"]
+    for entry, value in _written(options):
+        flag = entry.flags[0]
+        if entry.kind == "garments":
+            for garment in value:
+                iuv = f",{garment.iuv}" if garment.iuv else ""
+                words += [flag, f"{garment.photo}{iuv}", entry.flags[1], _parts(garment)]
+        elif entry.kind == "flag":
+            words.append(flag)
+        elif entry.kind == "switch":
+            on, off = flag.split("/")
+            words.append(on if value else off)
+        else:
+            words += [flag, _text(entry, value)]
+    return shlex.join(words)
+
+
+def manifest_text(options: RenderOptions, manifest: Path) -> str:
+    """Write a manifest of this one run, for `mt batch run`, as it stands at a path.
+
+    Paths below the manifest's folder are written relative to it, so that the folder can move.
+    """
+    folder = manifest.absolute().parent
+    job: dict[str, Any] = {}
+    for entry, value in _written(options):
+        if entry.in_manifest and entry.name not in ("output", "sheet"):
+            job[entry.word] = _manifest_value(entry, value, folder)
+    root = options.output.absolute().parent
+    job["output"] = _template(options.output.name)
+    whole: dict[str, Any] = {"version": 1, "output_root": _below(root, folder)}
+    if options.sheet is not None:
+        job["sheet"] = _template(_below(options.sheet, root))
+        if not options.sheet.absolute().is_relative_to(root):
+            whole["outside_outputs"] = True
+    whole["jobs"] = [job]
+    return yaml.safe_dump(whole, sort_keys=False, allow_unicode=True)
+
+
+def _written(options: RenderOptions) -> list[tuple[Option, Any]]:
+    """List the options that differ from their defaults, in the order of the help."""
+    entries = [(entry, getattr(options, entry.name)) for entry in list_options(RenderOptions)]
+    return [(entry, value) for entry, value in entries if entry.required or value != entry.default]
+
+
+def _manifest_value(entry: Option, value: Any, folder: Path) -> Any:
+    if entry.kind == "garments":
+        return [
+            {
+                "photo": _below(garment.photo, folder),
+                "parts": _parts(garment),
+                **({"iuv": _below(garment.iuv, folder)} if garment.iuv else {}),
+            }
+            for garment in value
+        ]
+    if entry.kind == "path":
+        if (entry.name, str(value)) in NAMES or not names_file(value):
+            return str(value)
+        path = _below(value, folder)
+        # marks of a glob in a file's name are to mean themselves
+        return glob.escape(path) if entry.name in ("source", "driver") else path
+    return value if entry.kind in ("flag", "switch", "integer") else _text(entry, value)
+
+
+def _text(entry: Option, value: Any) -> str:
+    if entry.kind == "frames":
+        start, stop = ("" if end is None else str(end) for end in value)
+        return f"{start}:{stop}"
+    return str(value)
+
+
+def _parts(garment: Garment) -> str:
+    return ",".join(PART_NAMES[part] for part in garment.parts)
+
+
+def _below(path: Path, folder: Path) -> str:
+    """Write a path relative to a folder if it lies there, else absolute."""
+    whole = path.absolute()
+    return str(whole.relative_to(folder)) if whole.is_relative_to(folder) else str(whole)
+
+
+def _template(name: str) -> str:
+    """Write a file's name as a template without placeholders."""
+    return name.replace("{", "{{").replace("}", "}}")

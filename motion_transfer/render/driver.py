@@ -1,0 +1,175 @@
+"""A driver as a run sees it: opened once whatever it is, and looked through once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from motion_transfer.drawing.person import People, find_people, take_as_one
+from motion_transfer.errors import InputError
+from motion_transfer.events import FramesDone, Listener, Notice, Stage
+from motion_transfer.media.driver_kind import tell_kind
+from motion_transfer.media.folders import list_gaps
+from motion_transfer.media.iuv.formats import ChannelOrder, Missing, names_file
+from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.media.iuv.stream import IuvReader
+from motion_transfer.people import FIRST_USE, is_cached, is_motion
+from motion_transfer.render.options import InputOptions
+from motion_transfer.render.picture_driver import ORDER, PictureDriver, estimate_driver
+from motion_transfer.render.plan import SeenFrame, frame_range, scan_people
+
+
+@dataclass(frozen=True)
+class DriverFile:
+    """A driver's IUV, which any process can open for itself.
+
+    Attributes:
+        missing: What a number missing from a folder does.
+    """
+
+    path: Path
+    missing: Missing
+    order: ChannelOrder
+
+    def open(self) -> IuvReader:
+        """Open it. Raises: InputError if it is gone, IuvFileError if it is not IUV."""
+        return open_reader(open_stream(self.path, missing=self.missing), self.order)
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A driver that was opened.
+
+    Attributes:
+        path: What the options name.
+        reader: Of its IUV.
+        frame_rate: Its own, if it has one.
+        pictures: What was made of it, if it is raw pictures.
+    """
+
+    path: Path
+    file: DriverFile
+    reader: IuvReader
+    frame_rate: Fraction | None
+    pictures: PictureDriver | None = None
+
+    @property
+    def frame_count(self) -> int:
+        return self.reader.stream.frame_count
+
+    def people_in(self, iuv: UInt8[np.ndarray, "H W 3"]) -> People:
+        """Find everybody in a frame; of raw pictures one person is left, in however many pieces."""
+        return take_as_one(iuv) if self.pictures else find_people(iuv)
+
+    def where(self, index: int) -> str:
+        """Name a frame, for messages."""
+        if self.pictures:  # not the video that is kept of it
+            return f"frame {index} of {self.path}"
+        return self.reader.stream.where(index)
+
+    def scan_of(self, chosen: range, seen: list[SeenFrame]) -> DriverScan:
+        """Sum up what was seen in the chosen frames, one entry for each."""
+        found = next((i for i, frame in enumerate(seen) if frame.people.persons), 0)
+        return DriverScan(
+            path=self.path,
+            file=self.file,
+            height=self.reader.height,
+            width=self.reader.width,
+            frame_rate=self.frame_rate,
+            chosen=chosen,
+            seen=seen,
+            where_first=self.where(chosen.start),
+            where_found=self.where(chosen.start + found),
+            pictures=self.pictures,
+        )
+
+
+@dataclass(frozen=True)
+class DriverScan:
+    """What one look through a driver tells, which any number of runs may share.
+
+    Attributes:
+        path: What the options name.
+        chosen: The frames that were looked at, `seen` one for each.
+        frame_rate: The driver's own, if it has one.
+        where_first, where_found: The first of the frames, and the first of them with somebody (if
+            there is one), for messages.
+        pictures: What was made of the driver, if it is raw pictures.
+    """
+
+    path: Path
+    file: DriverFile
+    height: int
+    width: int
+    frame_rate: Fraction | None
+    chosen: range
+    seen: list[SeenFrame]
+    where_first: str
+    where_found: str
+    pictures: PictureDriver | None = None
+
+
+def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driver:
+    """Open a driver; if it is raw pictures, find their IUV first, which takes a while.
+
+    Args:
+        folder: Where the IUV of pictures is kept.
+    Raises: InputError if there is no such driver, it cannot be told what it is, or an option does
+        not go with it.
+    """
+    if _are_pictures(options):
+        pictures = estimate_driver(options, folder, listener)
+        file = DriverFile(pictures.iuv, "fail", ORDER)
+        return Driver(options.driver, file, file.open(), pictures.frame_rate, pictures)
+    if options.fit_body:
+        raise InputError(
+            f"--fit-body compares landmarks, and IUV as in the driver {options.driver} has none;"
+            " give the video or pictures that it was made from, or leave out --fit-body"
+        )
+    if is_motion(options.driver) and not is_cached():
+        listener(Notice(FIRST_USE))  # now: what follows takes minutes
+    missing = options.missing or "fail"
+    stream = open_stream(options.driver, missing=missing)
+    if stream.gaps:
+        filled = "shows nobody" if missing == "background" else "repeats the frame before it"
+        listener(Notice(f"{list_gaps(stream.gaps)}; each {filled}"))
+    for note in stream.notes:
+        listener(Notice(note))
+    reader = open_reader(stream, options.iuv_order)
+    file = DriverFile(options.driver, missing, reader.order)
+    return Driver(options.driver, file, reader, stream.frame_rate)
+
+
+def scan_driver(
+    options: InputOptions, folder: Path, listener: Listener, *, workers: int
+) -> DriverScan:
+    """Open a driver and decode its chosen frames once.
+
+    Args:
+        folder: Where the IUV of pictures is kept.
+        workers: Threads that decode.
+    Raises: InputError; IuvFileError naming the frame that is broken.
+    """
+    driver = open_driver(options, folder, listener)
+    chosen = frame_range(options.frames, driver.frame_count, str(options.driver))
+    listener(Stage("scan", len(chosen)))
+    seen = scan_people(
+        driver.reader,
+        chosen,
+        workers,
+        lambda count: listener(FramesDone(count)),
+        find=driver.people_in,
+    )
+    return driver.scan_of(chosen, seen)
+
+
+def _are_pictures(options: InputOptions) -> bool:
+    if not names_file(options.driver):
+        return False
+    if not options.driver.exists():
+        raise InputError(f"driver {options.driver} does not exist")
+    return (options.driver_kind or tell_kind(options.driver)) == "pictures"

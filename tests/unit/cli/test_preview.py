@@ -1,0 +1,42 @@
+"""What `mt preview` shows, from what was typed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from motion_transfer.cli.preview import _options_of_words
+
+
+@pytest.mark.parametrize(
+    ("driver", "output"),
+    [
+        ("in/walk.mkv", "anna_walk.mp4"),
+        ("in/walk/", "anna_walk.mp4"),
+        ("people:walk,frames=9", "anna_walk.mp4"),
+        ("people:in/capture.bvh,fps=25", "anna_capture.mp4"),
+    ],
+)
+def test_the_output_is_named_by_source_and_driver(driver: str, output: str) -> None:
+    words = {"source": "in/anna.png", "driver": driver, "output": None}
+    assert _options_of_words(words).output == Path(output)
+    assert _options_of_words({**words, "output": "out/x.gif"}).output == Path("out/x.gif")
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--source", "a.png"), "--driver is missing; give a source and a driver, or a manifest"),
+        (("--source", "a.png", "--driver", "d", "--frame", "1"), "--frame needs -o FILE.png"),
+        (("jobs.yaml", "--driver", "d"), "says what its jobs do; leave out --driver"),
+        (("jobs.yaml", "--job", "7"), "job 7 asked for, but jobs.yaml has 1, from 0"),
+    ],
+)
+def test_what_is_refused(mt, tmp_path: Path, monkeypatch, words, reason: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    job = "{source: a.png, driver: d, output: a.mp4}"
+    Path("jobs.yaml").write_text(f"version: 1\njobs: [{job}]\n")
+    refused = mt("preview", *words)
+    assert (refused.code, refused.out) == (2, "")
+    assert reason in refused.err

@@ -1,0 +1,110 @@
+"""The two renderers, as the engine sees them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motion_transfer.drawing.renderers.interface import Renderer
+from motion_transfer.drawing.renderers.network import (
+    NeuralRenderer,
+    PreparedNetwork,
+    encode_source,
+    grow_mask,
+)
+from motion_transfer.drawing.renderers.texture import TextureRenderer, soften, tabulate_texture
+from motion_transfer.drawing.source import Source
+from motion_transfer.render.options import SourceOptions
+from motion_transfer.render.source import read_source
+from motion_transfer.weights.checkpoint import load_checkpoint
+
+
+@pytest.fixture
+def source(studio) -> Source:
+    return read_source(SourceOptions(source=studio.source()), 64)
+
+
+@pytest.fixture(params=["texture", "nhrr"])
+def renderer(request, source: Source, checkpoint: Path) -> Renderer:
+    if request.param == "texture":
+        return TextureRenderer(tabulate_texture(source))
+    model = load_checkpoint(checkpoint)
+    return NeuralRenderer(PreparedNetwork(model, compile=False), encode_source(model, source))
+
+
+def crops(studio, renderer: Renderer) -> np.ndarray:
+    size = renderer.working_size(64)
+    pose = studio.iuv(8, -20, size=(size, size))
+    return np.stack([pose] + [np.zeros_like(pose)] * (renderer.batch_size - 1))
+
+
+def test_a_renderer_gives_colour_and_coverage(studio, renderer: Renderer) -> None:
+    iuv = crops(studio, renderer)
+    rgba = renderer.render(iuv)
+    assert (rgba.dtype, rgba.shape) == (np.uint8, (*iuv.shape[:3], 4))
+    assert rgba[0, 20, 40, 3] == 255  # the middle of the torso
+    assert not rgba[0, :, 0, 3].any()
+    assert not rgba[1:, ..., 3].any()
+
+
+def test_a_renderer_repeats_itself(studio, renderer: Renderer) -> None:
+    iuv = crops(studio, renderer)
+    np.testing.assert_array_equal(renderer.render(iuv), renderer.render(iuv))
+
+
+def test_the_texture_renderer_looks_colours_up(studio, source: Source) -> None:
+    iuv = studio.iuv(0, 0, size=(96, 96))
+    rgba = TextureRenderer(tabulate_texture(source)).render(iuv[None])[0]
+    for part, colour in {2: (200, 40, 40), 9: (30, 60, 160), 23: (220, 180, 40)}.items():
+        middle = np.median(rgba[iuv[..., 0] == part][:, :3], axis=0)
+        np.testing.assert_allclose(middle, colour, atol=1)
+
+
+def test_softening_fades_inwards() -> None:
+    mask = np.zeros((400, 400), np.uint8)
+    mask[100:300, 100:300] = 255
+    soft = soften(mask)
+    assert (soft <= mask).all()
+    assert (soft[110:290, 110:290] == 255).all()
+    assert 0 < soft[200, 101] < 255
+
+
+def test_a_grown_mask_covers_the_outline_and_ends_nearby() -> None:
+    iuv = np.zeros((100, 100, 3), np.uint8)
+    iuv[40:60, 40:60, 0] = 2
+    mask = grow_mask(iuv)
+    assert (mask[40:60, 40:60] == 255).all()
+    assert 0 < mask[50, 36] <= 255
+    assert not mask[:30].any()
+
+
+def test_softening_never_grows() -> None:
+    mask = np.full((60, 60), 255, np.uint8)
+    mask[:30, :30] = 0
+    mask[45, 45] = 0
+    assert (soften(mask) <= mask).all()
+
+
+def test_a_network_is_compiled_once_for_each_side(
+    source: Source, checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch, "compile", lambda module, **_: module)
+    model = load_checkpoint(checkpoint)
+    network = PreparedNetwork(model, compile=True)
+    feature_map, drawn = encode_source(model, source), []
+
+    def draw(features: torch.Tensor) -> torch.Tensor:
+        drawn.append(features.shape[-1])
+        return features[:, : model.config.render_outputs]
+
+    monkeypatch.setattr(network, "_draw", draw)
+    for side, calls in ((64, 2), (64, 1), (96, 2), (64, 1)):
+        target = torch.zeros(network.batch_size, 3, side, side, dtype=torch.uint8)
+        network.draw(feature_map, target)
+        assert drawn == [side] * calls, "once ahead, then as asked"
+        drawn.clear()
+    network.compile_for(128)
+    assert drawn == [128]

