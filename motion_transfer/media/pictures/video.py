@@ -173,6 +173,12 @@ def _opened(
             if not container.streams.video:
                 raise InputError(f"video {path} has no pictures in it")
             stream = container.streams.video[0]
-            yield container, stream
+            try:
+                yield container, stream
+            finally:
+                # Closing holds the interpreter's lock and waits for the decoder's threads, which
+                # may be about to log and then wait for that lock: both for ever. They are stopped
+                # here, where the lock is free.
+                stream.codec_context.flush_buffers()
     except FFmpegError as error:
         raise InputError(explain(error.strerror)) from error

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -58,3 +61,30 @@ def test_a_frame_that_is_not_there_is_not_replaced_by_the_next(studio) -> None:
     video._timestamps[2] += 1
     with pytest.raises(InputError, match=r"frame 2 of .* cannot be decoded"):
         video.read(2)
+
+
+CLOSE_EARLY = """
+import faulthandler, sys
+from pathlib import Path
+from motion_transfer.media.iuv import video  # hears what decoders complain of
+from motion_transfer.media.pictures.video import FilmedVideo
+faulthandler.dump_traceback_later(60, exit=True)
+for count in range(150):
+    frames = FilmedVideo(Path(sys.argv[1])).read()
+    for _ in range(count % 12 + 1):
+        next(frames)
+    frames.close()
+"""
+
+
+def test_a_video_can_be_left_before_its_end(studio) -> None:
+    """Decoders have threads of their own, which may have something to say when they are closed."""
+    clip = studio.video(
+        studio.walk(40).repeat(4, 1).repeat(4, 2),
+        name="clip.mp4",
+        codec="libx264",
+        pixels="yuv420p",
+    )
+    command = [sys.executable, "-c", CLOSE_EARLY, str(clip)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=90)
+    assert result.returncode == 0, result.stderr
