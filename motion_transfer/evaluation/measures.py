@@ -11,8 +11,8 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Literal, Protocol
 
 import numpy as np
@@ -174,9 +174,8 @@ def choose_measures(
     chosen = []
     for name, row in MEASURES.items():
         if name in names:
-            module, _, maker = row.opener.partition(":")
             given = [files.get(name)] if row.needs == "weights" else []
-            chosen.append(getattr(import_module(module), maker)(*given))
+            chosen.append(resolve_name(row.opener)(*given))
     return Measures(tuple(chosen))
 
 

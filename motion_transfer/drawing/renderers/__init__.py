@@ -6,8 +6,8 @@ The table is light; what a row names is imported when it is first used.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from motion_transfer.weights import DEFAULT_WEIGHTS, find_weights
@@ -48,8 +48,7 @@ class RendererRow:
 
     def recipe(self, weights: Path | None) -> Recipe:
         """Make its recipe. Raises: InputError for weights that cannot be read."""
-        module, _, function = self.opener.partition(":")
-        return getattr(import_module(module), function)(*self.files(weights))
+        return resolve_name(self.opener)(*self.files(weights))
 
 
 RENDERERS: dict[str, RendererRow] = {}
