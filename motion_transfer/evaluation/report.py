@@ -18,7 +18,7 @@ from motion_transfer.evaluation.candidates import Candidate
 from motion_transfer.evaluation.framing import MASK_RULE, RESIZE_FILTER, Framing
 from motion_transfer.evaluation.measures import Column, Measures
 from motion_transfer.evaluation.scoring import PairScores
-from motion_transfer.media.pictures.photo import read_bytes
+from motion_transfer.media.files import read_bytes
 from motion_transfer.training.pairs import PairList
 from motion_transfer.version import package_version
 

@@ -326,7 +326,7 @@ def read_settings(path: Path) -> dict[str, Any]:
 
     Raises: InputError naming file, line of the section and key.
     """
-    from motion_transfer.media.pictures.photo import read_bytes
+    from motion_transfer.media.files import read_bytes
 
     try:
         text = read_bytes(path, "configuration").decode()

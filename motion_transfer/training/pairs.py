@@ -17,8 +17,8 @@ from pathlib import Path, PurePosixPath
 from typing import Protocol
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.files import read_bytes
 from motion_transfer.media.iuv.formats import ChannelOrder
-from motion_transfer.media.pictures.photo import read_bytes
 from motion_transfer.training.pictures import PhotoFile, Picture
 
 HEADERS = (("from", "to"), ("source", "target"))

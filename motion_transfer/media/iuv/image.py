@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 
 from motion_transfer.errors import IuvFileError
+from motion_transfer.media.files import read_bytes
 from motion_transfer.media.iuv.lookalikes import explain_grey
 from motion_transfer.media.iuv.stream import IuvStream, Raw
-from motion_transfer.media.pictures.photo import read_bytes
 
 LOSSY_SIGNATURES = {b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"\x00\x00\x00\x0cjP": "JPEG 2000"}
 """First bytes of a file and the format that they mean, whatever the file is called."""

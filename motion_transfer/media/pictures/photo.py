@@ -14,6 +14,7 @@ from jaxtyping import UInt8
 from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.files import read_bytes
 
 
 @dataclass(frozen=True)
@@ -38,16 +39,6 @@ class Photo:
         weight = self.alpha[..., None].astype(np.uint16)
         # in whole numbers, + 127 to round: the same bytes on every machine
         return ((self.rgb * weight + 255 * (255 - weight) + 127) // 255).astype(np.uint8)
-
-
-def read_bytes(path: Path, what: str) -> bytes:
-    """Read a file. Raises: InputError naming what the file was wanted for."""
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{what} {path} does not exist") from None
-    except OSError as error:
-        raise InputError(f"{what} {path} cannot be read: {error.strerror}") from error
 
 
 def allow_large() -> AbstractContextManager[object]:

@@ -85,7 +85,7 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
         (b"", "not a picture"),
         (b"just words", "not a picture"),
         ("half", "damaged: .*save it again"),
-        ("folder", "cannot be read: Is a directory"),
+        ("folder", "is a folder; name a file in it"),
     ],
 )
 def test_what_cannot_be_read_is_refused(tmp_path: Path, content, reason: str) -> None:
