@@ -16,9 +16,20 @@ from __future__ import annotations
 
 
 class MotionTransferError(Exception):
-    """The base of everything that this package raises on purpose."""
+    """The base of everything that this package raises on purpose.
+
+    Its arguments are its lines: one, but for an error that lists everything wrong with a file.
+    """
 
     exit_code = 1
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What to tell the user, a line each."""
+        return tuple(map(str, self.args))
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines)
 
 
 class InputError(MotionTransferError):

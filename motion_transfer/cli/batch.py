@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from motion_transfer.cli.options import FILE, add_options
 from motion_transfer.cli.progress import CountBar, JsonPrinter
+from motion_transfer.cli.terminal import printable, tell
 
 if TYPE_CHECKING:
     from motion_transfer.batch.events import BatchEvent, BatchListener
@@ -70,7 +71,7 @@ def validate(manifest: Path, settings: tuple[str, ...]) -> None:
 
     read = read_batch(manifest, settings)
     check_batch(read)
-    click.echo(f"{manifest}: {len(read.jobs)} jobs, all inputs are there")
+    tell(f"{manifest}: {len(read.jobs)} jobs, all inputs are there")
 
 
 @batch.command()
@@ -89,7 +90,7 @@ def status(manifest: Path, settings: tuple[str, ...], as_json: bool) -> None:
     for job in read.jobs:
         record = read.state.records.get(str(job.options.output), {})
         if record.get("status") == "failed":
-            click.echo(f"failed: {job.name}: {record['error']}")
+            tell(f"failed: {job.name}: {record['error']}")
 
 
 @batch.command()
@@ -100,7 +101,7 @@ def report(manifest: Path, settings: tuple[str, ...]) -> None:
     from motion_transfer.batch.run import read_batch
 
     read = read_batch(manifest, settings)
-    click.echo(f"wrote {write_report(read.jobs, read.state)}")
+    tell(f"wrote {write_report(read.jobs, read.state)}")
 
 
 @batch.command()
@@ -121,7 +122,7 @@ def _reporter(bar: CountBar, *, quiet: bool) -> BatchListener:
     frame_count = 0
 
     def say(words: str, *, err: bool = True) -> None:  # a plain print would tear the bar
-        tqdm.write(words, file=sys.stderr if err else sys.stdout)
+        tqdm.write(printable(words), file=sys.stderr if err else sys.stdout)
 
     def report(event: BatchEvent) -> None:
         nonlocal frame_count

@@ -10,7 +10,8 @@ import click
 
 from motion_transfer.cli.options import FILE, WordsCommand, described_options, section
 from motion_transfer.cli.people import prepare_body_model
-from motion_transfer.cli.progress import CountBar, note
+from motion_transfer.cli.progress import CountBar
+from motion_transfer.cli.terminal import note
 from motion_transfer.evaluation.options import OUTPUT, EvaluationOptions
 from motion_transfer.option import options_from_words
 

@@ -10,7 +10,8 @@ from typing import Any
 import click
 
 from motion_transfer.cli.options import FILE, SectionCommand, add_options, section
-from motion_transfer.cli.progress import CountBar, note
+from motion_transfer.cli.progress import CountBar
+from motion_transfer.cli.terminal import note, tell
 from motion_transfer.option import parse_rate
 
 input_option = section("Input")
@@ -211,4 +212,4 @@ def _report(quiet: bool, notes: Iterable[str], result: str) -> None:
     if not quiet:
         for words in notes:
             note(words)
-        click.echo(result)
+        tell(result)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import traceback
+import warnings
 from importlib import import_module
 from types import FrameType
 
 import click
 
+from motion_transfer.cli.terminal import printable
 from motion_transfer.errors import MotionTransferError
 from motion_transfer.version import __version__
 
@@ -31,6 +34,17 @@ HOMES = {"demo": "run", "inspect": "info", "models": "info"}
 
 INTERRUPTED = 130  # 128 and the signal's number, as shells have it
 TERMINATED = 143
+UNEXPECTED = 1
+UNUSABLE = 2  # as InputError has it
+
+DEBUG = click.Option(
+    ["--debug"],
+    is_flag=True,
+    expose_value=False,
+    help="After an error, show where in the program it arose.",
+    callback=lambda context, _option, value: _remember(context, debug=value),
+)
+"""An option of every command, since it is added to one that has just failed."""
 
 
 class LazyGroup(click.Group):
@@ -44,7 +58,9 @@ class LazyGroup(click.Group):
             return None
         module = import_module(f"motion_transfer.cli.{HOMES.get(cmd_name, cmd_name)}")
         # `eval_` for `eval`: a function does not take a builtin's name
-        return getattr(module, cmd_name, None) or getattr(module, f"{cmd_name}_")
+        command = getattr(module, cmd_name, None) or getattr(module, f"{cmd_name}_")
+        _add_debug(command)
+        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -73,21 +89,75 @@ def main(arguments: list[str] | None = None) -> int:
     # torch's threads would spin while they wait, and take the cores from decoding and encoding;
     # read when torch is first imported, which no command has done yet
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    settings = {"debug": False}
     try:
-        code = cli.main(args=arguments, prog_name="mt", standalone_mode=False)
+        with warnings.catch_warnings():
+            if not sys.warnoptions:  # what libraries tell developers is not for users
+                warnings.simplefilter("ignore")
+            code = cli.main(args=arguments, prog_name="mt", standalone_mode=False, obj=settings)
+            sys.stdout.flush()
     except click.ClickException as error:
         error.show()
         return error.exit_code
-    except MotionTransferError as error:
-        click.echo(f"mt: {error}", err=True)
-        return error.exit_code
-    except Terminated:
-        click.echo("mt: terminated, nothing half-written was left behind", err=True)
-        return TERMINATED
     except (KeyboardInterrupt, click.Abort):
         click.echo("mt: interrupted, nothing half-written was left behind", err=True)
         return INTERRUPTED
+    except Terminated:
+        click.echo("mt: terminated, nothing half-written was left behind", err=True)
+        return TERMINATED
+    except Exception as error:
+        if settings["debug"]:
+            traceback.print_exc()
+        code, words = _explain(error)
+        for line in words:
+            click.echo(f"mt: {line}", err=True)
+        return code
     return code if isinstance(code, int) else 0  # click returns the code of an early exit
+
+
+def _explain(error: Exception) -> tuple[int, list[str]]:
+    """Give the exit code of an error, and what to say of it."""
+    match error:
+        case MotionTransferError():
+            return error.exit_code, [printable(line) for line in error.lines]
+        case OSError() if _while_printing(error):
+            return UNEXPECTED, [f"cannot write to standard output: {error.strerror}"]
+        case OSError() if error.filename is not None:  # a name that no check has foreseen
+            return UNUSABLE, [printable(f"{os.fsdecode(error.filename)}: {error.strerror}")]
+        case _ if _is_memory_error(error):
+            return UNEXPECTED, [
+                "the memory is used up; give fewer --workers, a smaller picture, or more memory"
+            ]
+    kind, said = type(error).__name__, printable(next(iter(str(error).splitlines()), ""))
+    return UNEXPECTED, [
+        f"unexpected {kind}{': ' * bool(said)}{said}; this is a fault of the program: please report"
+        " it with what --debug adds"
+    ]
+
+
+def _while_printing(error: Exception) -> bool:
+    """Tell whether it was the result that could not be printed."""
+    return any(
+        frame.f_code is click.echo.__code__ for frame, _ in traceback.walk_tb(error.__traceback__)
+    )
+
+
+def _is_memory_error(error: Exception) -> bool:
+    """Tell whether memory ran out, in the words of whatever library wanted it."""
+    marks = ("can't allocate memory", "out of memory", "Insufficient memory")
+    return isinstance(error, MemoryError) or any(mark in str(error) for mark in marks)
+
+
+def _add_debug(command: click.Command) -> None:
+    if DEBUG not in command.params:
+        command.params.append(DEBUG)
+    if isinstance(command, click.Group):
+        for inner in command.commands.values():
+            _add_debug(inner)
+
+
+def _remember(context: click.Context, *, debug: bool) -> None:
+    context.find_root().obj["debug"] |= debug
 
 
 def entry_point() -> None:

@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
 from motion_transfer.cli.run import pair_garments
+from motion_transfer.cli.terminal import tell
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
 from motion_transfer.option import list_options, options_from_words
@@ -73,7 +74,7 @@ def preview(
         if words["output"] is None:
             raise InputError("--frame needs -o FILE.png")
         write_frame(options, frame, Path(words["output"]))
-        click.echo(f"{words['output']}: frame {frame}, {options.renderer} renderer")
+        tell(f"{words['output']}: frame {frame}, {options.renderer} renderer")
         return
     _serve(options, job_file, port, open_browser=not no_open)
 

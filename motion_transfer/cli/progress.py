@@ -16,6 +16,7 @@ from typing import Any, Self
 import click
 from tqdm import tqdm
 
+from motion_transfer.cli.terminal import note, tell
 from motion_transfer.drawing.renderers import RENDERERS
 from motion_transfer.events import Event, Finished, FramesDone, Listener, Notice, Stage
 
@@ -26,12 +27,6 @@ STAGE_WORDS = {
     "render": "rendering",
 }
 _open_bar = partial(tqdm, leave=False, dynamic_ncols=True)
-
-
-def note(words: str, *, quiet: bool = False) -> None:
-    """Say something that a person should know, though the work goes on."""
-    if not quiet:
-        click.echo(f"mt: note: {words}", err=True)
 
 
 def choose_listener(*, quiet: bool, as_json: bool) -> Listener:
@@ -79,7 +74,7 @@ class Reporter:
                     self._close()
                     note(event.message)
                 case Finished() if not self._quiet:
-                    click.echo(describe(event))
+                    tell(describe(event))
 
     def _close(self) -> None:
         if self._bar is not None:

@@ -6,6 +6,7 @@ What is made lies in a hidden folder beside it, on the same file system, until i
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import shutil
 import tempfile
@@ -15,28 +16,59 @@ from pathlib import Path
 
 from motion_transfer.errors import OutputError
 
+LONGEST_NAME_BYTES = 255
+"""What the file systems of today take (NAME_MAX)."""
+
+RANDOM_ENDING_BYTES = 16
+"""Room for what `tempfile` and others put behind a hidden name."""
+
+
+def name_beside(final: Path, ending: str) -> Path:
+    """Name something hidden beside an output, always the same for the same output.
+
+    An output's name may be as long as the file system takes: there is no room for more then, so
+    that it is cut, and a digest stands for the rest.
+    """
+    name = os.fsencode(final.name)
+    added = os.fsencode(f".{ending}")
+    if len(name) + len(added) + RANDOM_ENDING_BYTES > LONGEST_NAME_BYTES:
+        digest = hashlib.sha256(name).hexdigest()[:16].encode()
+        room = LONGEST_NAME_BYTES - RANDOM_ENDING_BYTES - len(added) - len(digest) - 1
+        # whole characters only: some file systems take nothing but text
+        kept = name[:room].decode("utf-8", "ignore")
+        name = kept.encode() + b"-" + digest
+    return final.absolute().with_name("." + os.fsdecode(name) + ending)
+
 
 def check_destination(path: Path, *, force: bool) -> None:
     """Refuse a destination before any work is done.
 
-    Raises: OutputError if it exists and `force` is off, or if its folder cannot be written.
+    Raises: OutputError if it exists and `force` is off, if its name is none, or if its folder
+        cannot be written.
     """
-    if path.exists() and not force:
-        raise OutputError(f"{path} exists already; choose another name or add --force")
-    # a mistyped name is not to cost somebody a folder of other things
-    if path.is_dir() and any(
-        item.suffix != ".png" or not item.stem.isdigit() for item in path.iterdir()
-    ):
-        raise OutputError(
-            f"{path} is a folder with other things than frames in it, and is not replaced even"
-            " with --force; choose another name"
-        )
-    parent = path.absolute().parent
-    existing = next(folder for folder in (parent, *parent.parents) if folder.exists())
-    if not existing.is_dir():
-        raise OutputError(f"cannot write {path}: {existing} is not a folder")
-    if not os.access(existing, os.W_OK | os.X_OK):
-        raise OutputError(f"cannot write {path}: no permission to write in {existing}")
+    with explain_disk_errors(path):
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise OutputError(f"{path} is a device or a pipe; choose the name of a file")
+        if path.exists() and not force:
+            raise OutputError(f"{path} exists already; choose another name or add --force")
+        # a mistyped name is not to cost somebody a folder of other things
+        if path.is_dir() and any(
+            item.suffix != ".png" or not item.stem.isdecimal() for item in path.iterdir()
+        ):
+            raise OutputError(
+                f"{path} is a folder with other things than frames in it, and is not replaced even"
+                " with --force; choose another name"
+            )
+        parent = path.absolute().parent
+        existing = next(folder for folder in (parent, *parent.parents) if folder.exists())
+        if not existing.is_dir():
+            raise OutputError(f"cannot write {path}: {existing} is not a folder")
+        try:
+            tempfile.TemporaryFile(dir=existing).close()
+        except OSError as error:  # no permission, a full disk, or a place such as /proc
+            raise OutputError(
+                f"cannot write {path}: {existing} takes no new files ({error.strerror})"
+            ) from error
 
 
 @contextmanager
@@ -48,7 +80,7 @@ def work_folder(final: Path) -> Iterator[Path]:
     with explain_disk_errors(final):
         parent = final.absolute().parent
         made = make_folder(parent)
-        folder = Path(tempfile.mkdtemp(prefix=f".{final.name}.work-", dir=parent))
+        folder = Path(tempfile.mkdtemp(prefix=name_beside(final, ".work-").name, dir=parent))
     try:
         with explain_disk_errors(final):
             yield folder
@@ -100,7 +132,7 @@ def publish(finished: Path, final: Path) -> None:
         _sync(file)
     if final.exists() and (final.is_dir() or finished.is_dir()):
         # a folder cannot be replaced, nor replace a file, in one step: the old one steps aside
-        old = Path(tempfile.mkdtemp(prefix=f".{final.name}.old-", dir=final.parent))
+        old = Path(tempfile.mkdtemp(prefix=name_beside(final, ".old-").name, dir=final.parent))
         final.replace(old / final.name)
         finished.replace(final)
         shutil.rmtree(old)

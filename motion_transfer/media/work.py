@@ -28,6 +28,7 @@ from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.publish import (
     explain_disk_errors,
     make_folder,
+    name_beside,
     publish,
     remove_folders,
 )
@@ -89,7 +90,7 @@ READ_BYTES = 1 << 20  # at a time, for digests: large enough, and small in memor
 
 def work_path(final: Path) -> Path:
     """Name the work folder of an output."""
-    return final.absolute().with_name(f".{final.name}.work")
+    return name_beside(final, ".work")
 
 
 @contextmanager

@@ -6,11 +6,12 @@ file of that format is opened. Help and option parsing read this table: it impor
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from motion_transfer.errors import InputError
+from motion_transfer.media.files import check_readable
 
 ChannelOrder = Literal["iuv", "vui"]
 """What a file's red, green and blue hold."""
@@ -159,8 +160,8 @@ def list_iuv_names(photo: Path) -> list[Path]:
 def find_iuv_of(photo: Path) -> Path | None:
     """Find the IUV that lies beside a photo; None means that it has to be estimated.
 
-    Raises: InputError if there is no such photo.
+    Raises: InputError if there is no such photo, or it is no file.
     """
-    if not photo.exists():
-        raise InputError(f"source {photo} does not exist")
-    return next((path for path in list_iuv_names(photo) if path.exists()), None)
+    check_readable(photo, "source")
+    # a photo's name may be so long that there cannot be one for its IUV
+    return next((path for path in list_iuv_names(photo) if os.path.exists(path)), None)

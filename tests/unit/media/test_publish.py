@@ -12,6 +12,7 @@ from motion_transfer.errors import OutputError
 from motion_transfer.media.publish import (
     check_destination,
     explain_disk_errors,
+    name_beside,
     publish,
     work_folder,
 )
@@ -113,3 +114,47 @@ def test_disk_errors_are_explained(number: int, reason: str) -> None:
 def test_other_errors_pass() -> None:
     with pytest.raises(ZeroDivisionError), explain_disk_errors(Path("out.mp4")):
         raise ZeroDivisionError
+
+
+@pytest.mark.parametrize("length", [10, 230, 245, 251, 255])
+@pytest.mark.parametrize("letter", ["n", "é", "人"])
+def test_a_name_as_long_as_can_be_is_published(tmp_path: Path, letter: str, length: int) -> None:
+    stem = letter * ((length - 4) // len(letter.encode()))
+    final = tmp_path / f"{stem}.mp4"
+    final.write_text("old")
+    with work_folder(final) as folder:
+        assert folder.name.startswith(f".{letter}")
+        publish(put(folder / "finished.mp4", "new"), final)
+    assert contents(final) == "new"
+    final.unlink()
+    put(tmp_path / stem, "old folder")
+    with work_folder(tmp_path / stem) as folder:
+        publish(put(folder / "finished", "new folder"), tmp_path / stem)
+    assert contents(tmp_path / stem) == "new folder"
+
+
+def test_hidden_names_tell_long_outputs_apart(tmp_path: Path) -> None:
+    long = "n" * 250
+    names = {name_beside(tmp_path / f"{long}{end}", ".work").name for end in ("1", "2", "1.mp4")}
+    assert len(names) == 3
+    assert all(len(name.encode()) <= 255 for name in names)
+    assert name_beside(tmp_path / f"{long}1", ".work") == name_beside(
+        tmp_path / f"{long}1", ".work"
+    )
+    assert name_beside(tmp_path / "out.mp4", ".work").name == ".out.mp4.work"
+
+
+def test_a_name_longer_than_that_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="the name is too long; choose a shorter one"):
+        check_destination(tmp_path / ("n" * 256), force=False)
+
+
+def test_a_device_is_never_replaced() -> None:
+    with pytest.raises(OutputError, match="/dev/null is a device or a pipe"):
+        check_destination(Path("/dev/null"), force=True)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs Linux' /proc")
+def test_a_place_that_takes_no_files_is_refused() -> None:
+    with pytest.raises(OutputError, match=r"cannot write /proc/out.mp4: /proc takes no new files"):
+        check_destination(Path("/proc/out.mp4"), force=False)

@@ -1,0 +1,106 @@
+"""Whatever goes wrong is one line and an exit code."""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import click
+import pytest
+
+from motion_transfer.cli import main as program
+from motion_transfer.cli.terminal import printable
+from motion_transfer.errors import InputError, RenderError
+
+ENTRY_POINT = "from motion_transfer.cli.main import entry_point; entry_point()"
+
+
+@pytest.fixture
+def failing(monkeypatch: pytest.MonkeyPatch):
+    """Make `mt info` raise."""
+
+    def fail_with(error: BaseException) -> None:
+        @click.command()
+        def info() -> None:
+            raise error
+
+        monkeypatch.setattr("motion_transfer.cli.info.info", info)
+
+    return fail_with
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (InputError("driver a is none"), 2, "mt: driver a is none"),
+        (InputError("one", "two"), 2, "mt: one\nmt: two"),
+        (RenderError("the encoder stopped"), 1, "mt: the encoder stopped"),
+        (InputError("driver a\nb\x1b[31m is none"), 2, r"mt: driver a\nb\x1b[31m is none"),
+        (InputError("driver \udcff is none"), 2, r"mt: driver \udcff is none"),
+        (OSError(errno.ENAMETOOLONG, "File name too long", "x"), 2, "mt: x: File name too long"),
+        (MemoryError(), 1, "mt: the memory is used up; give fewer --workers"),
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory: you"), 1, "mt: the memory is"),
+        (KeyError("key"), 1, "mt: unexpected KeyError: 'key'; this is a fault of the program"),
+        (RecursionError(), 1, "mt: unexpected RecursionError; this is a fault of the program"),
+        (ValueError("one\ntwo"), 1, "mt: unexpected ValueError: one; this"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
+)
+def test_every_error_is_one_line(
+    failing, capsys, error: BaseException, code: int, line: str
+) -> None:
+    failing(error)
+    assert program.main(["info"]) == code
+    said = capsys.readouterr().err
+    assert said.startswith(line)
+    assert said.count("\n") == line.count("\n") + 1
+    assert "Traceback" not in said
+
+
+def test_debug_shows_where(failing, capsys) -> None:
+    failing(KeyError("key"))
+    assert program.main(["info", "--debug"]) == 1
+    said = capsys.readouterr().err
+    assert "Traceback" in said
+    assert "in info" in said
+    assert said.splitlines()[-1].startswith("mt: unexpected KeyError")
+
+
+@pytest.mark.parametrize("command", [["run"], ["iuv", "convert"], ["batch", "status"], ["demo"]])
+def test_every_command_takes_debug(command: list[str], capsys) -> None:
+    program.main([*command, "--help"])
+    assert "--debug" in capsys.readouterr().out
+
+
+def test_warnings_of_libraries_are_kept_from_users(monkeypatch, capsys) -> None:
+    @click.command()
+    def info() -> None:
+        warnings.warn("for developers", stacklevel=1)
+
+    monkeypatch.setattr("motion_transfer.cli.info.info", info)
+    monkeypatch.setattr(sys, "warnoptions", [])
+    assert program.main(["info"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux' /dev/full")
+@pytest.mark.parametrize("arguments", [["--help"], ["info", "parts"], ["run", "--help"]])
+def test_a_full_standard_output_is_one_line(arguments: list[str]) -> None:
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", ENTRY_POINT, *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 1
+    assert done.stderr == "mt: cannot write to standard output: No space left on device\n"
+
+
+def test_what_a_terminal_would_obey_is_written_out() -> None:
+    assert printable("größe 人.png") == "größe 人.png"
+    assert printable("a\tb\r\x07‮c") == "a\\tb\\r\\x07\\u202ec"
