@@ -44,6 +44,7 @@ def render_video(
     codec: str | None = None,
     crf: int | None = None,
     audio: AnyPath | None = None,
+    audio_track: int | None = None,
     size: Literal["driver", "crop", "even"] = "driver",
     compare: bool = False,
     sheet: AnyPath | None = None,
@@ -81,6 +82,7 @@ def render_video(
         frame_rate: Frames per second, exact if given as a string or Fraction.
         codec, crf: Of a video; else by container and codec.
         audio: File whose sound is laid under, or `"none"`; else the driver's own, if it has any.
+        audio_track: Which of the sound's tracks, 0 first; else the one that is marked as default.
         size: The driver's frame, the square around the person, or the frame made even.
         compare: Show source, IUV and result side by side.
         sheet: Where to write a contact sheet (PNG) as well.
@@ -120,6 +122,7 @@ def render_video(
             codec=codec,
             crf=crf,
             audio=_path(audio),
+            audio_track=audio_track,
             size=size,
             compare=compare,
             sheet=_path(sheet),

@@ -12,12 +12,12 @@ from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
-import av
 import numpy as np
 from av.error import FFmpegError
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.container import find_pictures, open_input
 from motion_transfer.media.iuv.formats import DriverKind, find_iuv_format
 from motion_transfer.media.iuv.lookalikes import explain_picture, explain_scaled_uv
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, list_photos, open_pictures
@@ -117,6 +117,6 @@ def _frames(path: Path) -> Iterator[Frame]:
             yield read_photo(path, "driver").rgb
             yield from islice(open_pictures(path).read(), 1, None)  # it may hold several
         elif path.is_file():
-            with av.open(str(path)) as container:
-                for frame in container.decode(video=0):
+            with open_input(path, "driver") as container:
+                for frame in container.decode(find_pictures(container)):
                     yield frame.to_ndarray(format="rgb24")

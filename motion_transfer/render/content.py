@@ -31,7 +31,7 @@ KEYED_ELSEWHERE = {
     *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
     *("renderer", "compile", "codec", "crf"),  # by the recipe and the format
     *("output", "force", "restart", "workers"),  # never change what is drawn
-    *("sheet", "audio"),  # made when everything is drawn
+    *("sheet", "audio", "audio_track"),  # made when everything is drawn
 }
 """Options that a run's key need not name. All others are in it: a new one cannot be forgotten."""
 

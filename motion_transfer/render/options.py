@@ -282,6 +282,13 @@ class OutputOptions(_Part):
         kind="path",
         metavar="FILE|none",
     )
+    audio_track: int | None = option(
+        "--audio-track",
+        "Output",
+        "Which of the sound's tracks, 0 first; default: the one marked as default.",
+        kind="integer",
+        metavar="N",
+    )
     size: str = option(
         "--size",
         "Output",

@@ -31,6 +31,7 @@ class IuvStream(ABC):
 
     Attributes:
         kind: What this driver is, for people.
+        start_seconds: When the first frame is shown, on the clock of the file's sound.
         order: The channel order where the format itself settles it, else None.
         gaps: Numbers missing from a folder, each of whose places is filled.
         notes: What the user should know of how this driver is read, in sentences.
@@ -41,6 +42,7 @@ class IuvStream(ABC):
         self.kind = kind
         self.frame_count = frame_count
         self.frame_rate: Fraction | None = None
+        self.start_seconds = Fraction(0)
         self.order: ChannelOrder | None = None
         self.gaps: tuple[int, ...] = ()
         self.notes: tuple[str, ...] = ()

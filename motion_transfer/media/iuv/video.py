@@ -6,19 +6,22 @@ is refused. So is one that breaks off or is damaged inside: decoders show someth
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 import av
 import av.logging
+import cv2
 from av.container import InputContainer
 from av.error import FFmpegError
 
 from motion_transfer.errors import IuvFileError
+from motion_transfer.media.container import find_pictures, open_input
 from motion_transfer.media.iuv.lookalikes import explain_picture
 from motion_transfer.media.iuv.stream import IuvStream, Raw
+from motion_transfer.media.pictures.display import describe_pixels, find_pixel_ratio, square_size
 from motion_transfer.media.pictures.video import pick_frames
 
 LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
@@ -26,10 +29,7 @@ LOSSLESS_REMEDY = (
     "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt bgr0 out.mkv`"
 )
 
-# A decoder that meets damage conceals it, returns wrong pixels and only logs an error. Errors have
-# to reach Python for `_decode_intact` to hear of them, and nobody else needs to.
-av.logging.set_level(av.logging.ERROR)
-logging.getLogger("libav").addHandler(logging.NullHandler())
+NEAREST = cv2.INTER_NEAREST_EXACT  # the other one is shifted by half a pixel
 
 
 class VideoStream(IuvStream):
@@ -37,12 +37,12 @@ class VideoStream(IuvStream):
 
     def __init__(self, path: Path) -> None:
         try:
-            with av.open(str(path)) as container:
-                if not container.streams.video:
-                    raise IuvFileError(f"driver {path} has no video in it")
-                stream = container.streams.video[0]
+            with open_input(path, "driver") as container:
+                stream = find_pictures(container)
+                if stream is None:
+                    raise IuvFileError(f"driver {path} has no video in it that FFmpeg can decode")
                 codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
-                _check_lossless(path, container, codec, pixels)
+                _check_lossless(path, container, stream)
                 # frames are found by these times: containers differ in how they count frames
                 times = sorted(
                     (packet.pts, packet.duration or 0)
@@ -50,9 +50,12 @@ class VideoStream(IuvStream):
                     if packet.pts is not None
                 )
                 self._timestamps = [pts for pts, _ in times]
+                self._pixel_ratio = find_pixel_ratio(stream)
+                notes = describe_pixels(path, stream)
+                base = stream.time_base or Fraction(1)
                 rate = stream.average_rate or stream.guessed_rate
-                if times and rate and stream.time_base:
-                    last, duration = (ticks * stream.time_base for ticks in times[-1])
+                if times and rate:
+                    last, duration = (ticks * base for ticks in times[-1])
                     # Matroska does not always say how long the last frame is shown
                     _check_whole(path, container, last + (duration or 1 / rate), 1 / rate)
         except FFmpegError as error:
@@ -63,17 +66,23 @@ class VideoStream(IuvStream):
             raise IuvFileError(f"driver {path} holds no frames")
         super().__init__(path, f"IUV video ({codec}, {pixels})", len(self._timestamps))
         self.frame_rate = Fraction(rate) if rate else None
+        self.start_seconds = self._timestamps[0] * base
+        self.notes = notes
 
     def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
         index = start
         try:
-            with av.open(str(self.path)) as container:
-                stream = container.streams.video[0]
+            with open_input(self.path, "driver") as container:
+                stream = cast(av.VideoStream, find_pictures(container))
                 stream.codec_context.thread_count = 1  # chunks are read in parallel already
                 wanted = self._timestamps[start:stop]
                 container.seek(wanted[0], stream=stream, backward=True)
                 for frame in pick_frames(_decode_intact(container, stream), wanted):
-                    yield frame.to_ndarray(format="rgb24")
+                    size = square_size(frame.width, frame.height, self._pixel_ratio)
+                    raw = frame.to_ndarray(format="rgb24")
+                    # parts have no values between them
+                    stretched = size != (frame.width, frame.height)
+                    yield cv2.resize(raw, size, interpolation=NEAREST) if stretched else raw
                     index += 1
         except (FFmpegError, _DamagedError) as error:
             reason = error.strerror if isinstance(error, FFmpegError) else error
@@ -101,9 +110,10 @@ def _decode_intact(container: InputContainer, stream: av.VideoStream) -> Iterato
         yield frame
 
 
-def _check_lossless(path: Path, container: InputContainer, codec: str, pixels: str) -> None:
+def _check_lossless(path: Path, container: InputContainer, stream: av.VideoStream) -> None:
+    codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
     if codec not in LOSSLESS_CODECS:
-        known = _explain_first_frame(container)
+        known = _explain_first_frame(container, stream)
         if known:
             raise IuvFileError(f"driver {path} is not IUV: {known}")
         raise IuvFileError(
@@ -117,9 +127,9 @@ def _check_lossless(path: Path, container: InputContainer, codec: str, pixels: s
         )
 
 
-def _explain_first_frame(container: InputContainer) -> str | None:
+def _explain_first_frame(container: InputContainer, stream: av.VideoStream) -> str | None:
     """Tell what the pictures of a lossy video are, if they are often mistaken for IUV."""
-    frame = next(container.decode(video=0), None)
+    frame = next(container.decode(stream), None)
     return None if frame is None else explain_picture(frame.to_ndarray(format="rgb24"))
 
 

@@ -12,6 +12,7 @@ from av.container import OutputContainer
 from av.filter import Graph
 from av.filter.context import FilterContext
 
+from motion_transfer.media.container import open_input, open_output
 from motion_transfer.media.output.segments import Segments
 from motion_transfer.media.output.video import open_segment as open_segment
 
@@ -23,7 +24,7 @@ def join_segments(
 ) -> None:
     """Encode segments as a looping GIF; frame times are rounded to the format's hundredths."""
     palette = _find_palette(segments, rate)
-    with av.open(str(destination), "w", format="gif", options={"loop": "0"}) as output:
+    with open_output(destination, format_name="gif", options={"loop": "0"}) as output:
         first = next(_frames(segments, rate))
         stream = output.add_stream("gif", rate=rate)
         stream.width, stream.height, stream.pix_fmt = first.width, first.height, "pal8"
@@ -85,7 +86,7 @@ def _frames(segments: Segments, rate: Fraction) -> Iterator[av.VideoFrame]:
     """Decode the frames of all segments, numbered through."""
     index = 0
     for path, _ in segments:
-        with av.open(str(path)) as container:
+        with open_input(path, "segment") as container:
             for frame in container.decode(video=0):
                 frame.pts, frame.time_base = index, 1 / rate
                 yield frame

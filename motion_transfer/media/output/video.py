@@ -23,6 +23,7 @@ from av.video.reformatter import ColorRange, Colorspace, Interpolation
 from jaxtyping import UInt8
 
 from motion_transfer.errors import OutputError
+from motion_transfer.media.container import open_input, open_output
 from motion_transfer.media.output.audio import AudioCut, AudioTrack
 from motion_transfer.media.output.formats import CONTAINERS, OutputFormat
 from motion_transfer.media.output.segments import Segments, WriteFrame
@@ -50,7 +51,7 @@ def open_segment(
         conversion["dst_colorspace"] = Colorspace.ITU709
         conversion["dst_color_range"] = ColorRange.MPEG
         conversion["interpolation"] = Interpolation.AREA
-    with av.open(str(path), "w", format=SEGMENT_CONTAINER) as container:
+    with open_output(path, format_name=SEGMENT_CONTAINER) as container:
         stream = container.add_stream(codec.encoder, rate=rate, options=options)
         stream = cast(av.VideoStream, stream)
         stream.width, stream.height = size
@@ -94,11 +95,11 @@ def join_segments(
     orders = [_showing_order(path, rate) for path, _ in segments]
     # a frame is decoded before it is shown: decoding begins as much earlier as one ever needs
     delay = max(index - number for order in orders for index, number in enumerate(order))
-    with av.open(str(destination), "w", options=options) as output:
+    with open_output(destination, options=options) as output:
         stream = sound = None
         first = 0
         for (path, frame_count), order in zip(segments, orders, strict=True):
-            with av.open(str(path)) as segment:
+            with open_input(path, "segment") as segment:
                 template = segment.streams.video[0]
                 if stream is None:
                     stream = output.add_stream_from_template(template, opaque=True)
@@ -132,7 +133,7 @@ def _tag_bt709(context: VideoCodecContext) -> None:
 
 def _showing_order(path: Path, rate: Fraction) -> list[int]:
     """List the frame number in its segment of each packet, in decoding order."""
-    with av.open(str(path)) as segment:
+    with open_input(path, "segment") as segment:
         numbers = [round((p.pts or 0) * p.time_base * rate) for p in _packets(segment)]
     start = min(numbers)  # the container shifts time so that decoding begins at 0
     return [number - start for number in numbers]

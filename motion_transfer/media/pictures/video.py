@@ -19,6 +19,13 @@ from av.error import FFmpegError
 from jaxtyping import Int32
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.container import find_pictures, open_input
+from motion_transfer.media.pictures.display import (
+    deinterlaced,
+    describe_pixels,
+    find_pixel_ratio,
+    square_size,
+)
 from motion_transfer.media.pictures.stream import (
     Frame,
     PictureStream,
@@ -33,8 +40,6 @@ class IndexedVideo:
     def __init__(self, path: Path) -> None:
         """Raises: InputError if the file is missing, is no video, or holds no frames."""
         self.path = path
-        if not path.is_file():
-            raise InputError(f"video {path} does not exist")
         with _opened(path, lambda reason: f"{path} is not a readable video: {reason}") as video:
             packets = video[0].demux(video[1])
             self._timestamps = sorted(p.pts for p in packets if p.pts is not None)
@@ -46,18 +51,22 @@ class IndexedVideo:
         return len(self._timestamps)
 
     def read(self, index: int) -> Frame:
-        """Read one frame, RGB. Raises: InputError naming the frame that cannot be decoded."""
+        """Read one frame, RGB, as it is shown.
+
+        Raises: InputError naming the frame that cannot be decoded.
+        """
         wanted = self._timestamps[index]
+        before = self._timestamps[max(index - 1, 0)]  # what is interlaced is told by its neighbours
         where = f"frame {index} of {self.path}"
         with _opened(self.path, lambda reason: _damaged(where, reason)) as (container, stream):
-            container.seek(wanted, stream=stream, backward=True)
-            for frame in pick_frames(container.decode(stream), [wanted]):
-                return frame.to_ndarray(format="rgb24")
+            container.seek(before, stream=stream, backward=True)
+            for frame in pick_frames(deinterlaced(container.decode(stream)), [wanted]):
+                return _show(frame, find_pixel_ratio(stream), _display_matrix(frame))
         raise InputError(f"{where} cannot be decoded; export it again")
 
 
 class FilmedVideo(PictureStream):
-    """A video as a clip: upright, and at a constant rate."""
+    """A video as a clip: upright, of whole frames with square pixels, and at a constant rate."""
 
     def __init__(self, path: Path) -> None:
         """Raises: InputError if it is no video, or has no frames that can be decoded."""
@@ -79,10 +88,14 @@ class FilmedVideo(PictureStream):
             first = next(container.decode(stream), None)
             if first is None:
                 raise InputError(f"video {path} holds no frames")
-            self._matrix = _display_matrix(first)
-            height, width = turn_upright(first.to_ndarray(format="rgb24"), self._matrix).shape[:2]
+            self._pixel_ratio, self._matrix = find_pixel_ratio(stream), _display_matrix(first)
+            height, width = _show(first, self._pixel_ratio, self._matrix).shape[:2]
+            notes = describe_pixels(path, stream)
+            if first.interlaced_frame:
+                notes += (f"{path} is interlaced; every frame is made whole (FFmpeg's bwdif)",)
         super().__init__(path, self._timing.count, height, width)
         self._take_timing(self._timing)
+        self.notes += notes
 
     def read(self) -> Iterator[Frame]:
         shown: av.VideoFrame | None = None
@@ -91,7 +104,7 @@ class FilmedVideo(PictureStream):
         with _opened(self.path, lambda reason: _damaged(self.where(index), reason)) as video:
             for frame in show_steadily(self._decode(*video), self._timing):
                 if picture is None or frame is not shown:  # repeated frames are converted once
-                    shown, picture = frame, self._upright(frame, index)
+                    shown, picture = frame, self._shown(frame, index)
                 yield picture
                 index += 1
         if shown is None:
@@ -102,14 +115,14 @@ class FilmedVideo(PictureStream):
     ) -> Iterator[tuple[Fraction, av.VideoFrame]]:
         """Decode frames, each with when it is shown, in seconds."""
         stream.thread_type = "AUTO"
-        for number, frame in enumerate(container.decode(stream)):
+        for number, frame in enumerate(deinterlaced(container.decode(stream))):
             if self._clocked and frame.pts is not None and frame.time_base is not None:
                 yield frame.pts * frame.time_base, frame
             else:
                 yield self.start_seconds + number / self._timing.rate, frame
 
-    def _upright(self, frame: av.VideoFrame, index: int) -> Frame:
-        picture = turn_upright(frame.to_ndarray(format="rgb24"), self._matrix)
+    def _shown(self, frame: av.VideoFrame, index: int) -> Frame:
+        picture = _show(frame, self._pixel_ratio, self._matrix)
         return self._check_size(picture, index, "the video began with", "export it in one size")
 
 
@@ -149,6 +162,14 @@ def turn_upright(picture: Frame, matrix: Int32[np.ndarray, "3 3"] | None) -> Fra
     return np.ascontiguousarray(picture)
 
 
+def _show(
+    frame: av.VideoFrame, pixel_ratio: Fraction, matrix: Int32[np.ndarray, "3 3"] | None
+) -> Frame:
+    """Turn a frame into a picture as it is shown: RGB, with square pixels, upright."""
+    width, height = square_size(frame.width, frame.height, pixel_ratio)
+    return turn_upright(frame.to_ndarray(format="rgb24", width=width, height=height), matrix)
+
+
 def _display_matrix(frame: av.VideoFrame) -> Int32[np.ndarray, "3 3"] | None:
     """Find how the file asks to be shown, if it does."""
     data = frame.side_data.get("DISPLAYMATRIX")
@@ -169,16 +190,10 @@ def _opened(
         explain: Puts FFmpeg's reason into a message.
     """
     try:
-        with av.open(str(path)) as container:
-            if not container.streams.video:
-                raise InputError(f"video {path} has no pictures in it")
-            stream = container.streams.video[0]
-            try:
-                yield container, stream
-            finally:
-                # Closing holds the interpreter's lock and waits for the decoder's threads, which
-                # may be about to log and then wait for that lock: both for ever. They are stopped
-                # here, where the lock is free.
-                stream.codec_context.flush_buffers()
+        with open_input(path) as container:
+            stream = find_pictures(container)
+            if stream is None:
+                raise InputError(f"video {path} has no pictures in it that FFmpeg can decode")
+            yield container, stream
     except FFmpegError as error:
         raise InputError(explain(error.strerror)) from error

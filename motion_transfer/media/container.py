@@ -1,0 +1,87 @@
+"""The one way to open a media file, to read or to write.
+
+FFmpeg takes a name for an address: a colon may name a protocol, and what a file says may send it to
+other files or into the network. So it never sees the name of a file that is read, only the file,
+opened, and nothing else is it allowed to open.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import cast
+
+import av
+import av.logging
+from av.container import InputContainer, OutputContainer
+from av.stream import Disposition
+
+from motion_transfer.media.files import check_readable
+
+LARGEST_PICTURE = 2**27
+"""Pixels: 16K (15360 x 8640) fits. A header may claim anything, and its claim becomes memory."""
+
+# A decoder that meets damage conceals it, returns wrong pixels and only logs an error. Errors have
+# to reach Python for readers of IUV to hear of them, and nobody else needs to.
+av.logging.set_level(av.logging.ERROR)
+logging.getLogger("libav").addHandler(logging.NullHandler())
+
+
+@contextmanager
+def open_input(path: Path, what: str = "video") -> Iterator[InputContainer]:
+    """Open a file to read, whatever it is called.
+
+    Lists of other files (HLS, concat) are refused.
+
+    Args:
+        what: What the file is wanted for, for messages.
+    Raises: InputError for what is no file to read; FFmpegError for what FFmpeg cannot read.
+    """
+    check_readable(path, what)
+    limits = {"max_pixels": str(LARGEST_PICTURE)}
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        options = {"fd": str(descriptor), "protocol_whitelist": "fd"} | limits
+        # a title in another encoding than UTF-8 is no reason to refuse pictures
+        container = av.open("fd:", options=options, metadata_errors="replace")
+    finally:
+        os.close(descriptor)  # FFmpeg has one of its own
+    with container:
+        codecs = [stream.codec_context for stream in container.streams.video]
+        codecs = [codec for codec in codecs if codec is not None]  # of codecs that FFmpeg knows
+        for codec in codecs:
+            codec.options = limits
+        try:
+            yield container
+        finally:
+            # Closing holds the interpreter's lock and waits for the decoder's threads, which may be
+            # about to log and then wait for that lock: both for ever. They are stopped here, where
+            # the lock is free.
+            for codec in codecs:
+                codec.flush_buffers()
+
+
+def find_pictures(container: InputContainer) -> av.VideoStream | None:
+    """Find the first stream of pictures that can be decoded; the cover of a song is none."""
+    for stream in container.streams.video:
+        is_cover = stream.disposition & Disposition.attached_pic
+        if not is_cover and stream.codec_context is not None:
+            return stream
+    return None
+
+
+def open_output(
+    path: Path, *, format_name: str | None = None, options: dict[str, str] | None = None
+) -> OutputContainer:
+    """Open a file to write, whatever it is called.
+
+    Args:
+        format_name: FFmpeg's name of the container; else the ending says it.
+        options: FFmpeg's, of the container.
+    Raises: FFmpegError, which is an OSError where the disk refuses.
+    """
+    # a name with a colon in it is not an address when another stands before it
+    return cast(OutputContainer, av.open(f"file:{path}", "w", format_name, options or {}))
