@@ -139,7 +139,6 @@ def prepare_run(
         [shot.window.side for shot in plan.shots],
         lambda words: listener(Notice(words)),
     )
-    begins = scan.pictures.start_seconds if scan.pictures else 0
     key = run_key(
         options,
         recipe=recipe,
@@ -160,8 +159,10 @@ def prepare_run(
             options.audio,
             options.output,
             output_format,
+            listener,
+            track=options.audio_track,
             driver=options.driver,
-            start_seconds=begins + plan.first / (scan.frame_rate or plan.frame_rate),
+            start_seconds=scan.start_seconds + plan.first / (scan.frame_rate or plan.frame_rate),
             duration_seconds=len(plan.frames) / plan.frame_rate,
         ),
         chunk_keys=tuple(chunk_key(key, plan, chunk) for chunk in plan.chunks),

@@ -80,6 +80,7 @@ class Driver:
             height=self.reader.height,
             width=self.reader.width,
             frame_rate=self.frame_rate,
+            start_seconds=(self.pictures or self.reader.stream).start_seconds,
             chosen=chosen,
             seen=seen,
             where_first=self.where(chosen.start),
@@ -96,6 +97,7 @@ class DriverScan:
         path: What the options name.
         chosen: The frames that were looked at, `seen` one for each.
         frame_rate: The driver's own, if it has one.
+        start_seconds: When its first frame is shown, on the clock of its sound.
         where_first, where_found: The first of the frames, and the first of them with somebody (if
             there is one), for messages.
         pictures: What was made of the driver, if it is raw pictures.
@@ -106,6 +108,7 @@ class DriverScan:
     height: int
     width: int
     frame_rate: Fraction | None
+    start_seconds: Fraction
     chosen: range
     seen: list[SeenFrame]
     where_first: str

@@ -18,6 +18,7 @@ from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.codecs import CODECS, LOSSLESS
+from motion_transfer.media.container import open_output
 from motion_transfer.media.iuv.formats import CHANNEL_ORDERS, ChannelOrder
 from motion_transfer.media.pictures.photo import write_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
@@ -152,7 +153,7 @@ def _open_video(path: Path, settings: IuvOutput, channels: tuple[int, ...]) -> I
     codec = CODECS[LOSSLESS]
     given, stored = ("rgb24", codec.pixel_format) if channels else ("gray", "gray")
     # or Matroska marks its segments with random numbers, and no two files are alike
-    with av.open(str(path), "w", options={"fflags": "+bitexact"}) as container:
+    with open_output(path, options={"fflags": "+bitexact"}) as container:
         rate = settings.frame_rate or VIDEO_RATE
         stream = cast(av.VideoStream, container.add_stream(codec.encoder, rate, codec.options))
         stream.width, stream.height = settings.width, settings.height
