@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice, product
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 from pydantic import BaseModel
@@ -18,16 +21,20 @@ from motion_transfer.batch.manifest import (
     Place,
     plain,
 )
-from motion_transfer.batch.state import audio_files, driver_files
 from motion_transfer.errors import InputError
+from motion_transfer.media.files import check_readable
 from motion_transfer.media.iuv.formats import names_file
+from motion_transfer.media.structured import shown
 from motion_transfer.option import list_options
+from motion_transfer.render.inputs import audio_files, driver_files
 from motion_transfer.render.options import NO_AUDIO, RenderOptions
 from motion_transfer.weights import SHIPPED, find_weights
 
 OPTIONS = {entry.word: entry for entry in list_options(RenderOptions)}
 BELOW_ROOT = ("output", "sheet")
 GLOB_MARKS = "*?["
+MOST_JOBS = 100_000  # what a gigabyte holds
+FORMAT = re.compile(r"0?[0-9]{0,2}d?")  # of a placeholder, such as 04 in {index:04}
 ANY_OUTPUT = "OUTPUT"
 """Stands for an output's name in a message that many jobs share."""
 
@@ -131,10 +138,15 @@ class _Spread:
                     yield place, source, driver, entry
         for number, entry in enumerate(self._manifest.matrix):
             place = ("matrix", number)
+            sources = self._matches((*place, "sources"), entry.sources, photos=True)
             drivers = self._matches((*place, "drivers"), entry.drivers, photos=False)
-            for source in self._matches((*place, "sources"), entry.sources, photos=True):
-                for driver in drivers:
-                    yield place, source, driver, entry
+            if len(sources) * len(drivers) > MOST_JOBS:
+                raise ManifestError(
+                    f"{self._text.where(place)}: {len(sources):,} sources with {len(drivers):,}"
+                    f" drivers are more than {MOST_JOBS:,} jobs; split them"
+                )
+            for source, driver in product(sources, drivers):
+                yield place, source, driver, entry
 
     def options(
         self, place: Place, source: str, driver: str, entry: Any, number: int
@@ -188,21 +200,42 @@ class _Spread:
                 continue
             base = Path(pattern).anchor
             start = Path(base) if base else self._folder
-            matches = sorted(str(p) for p in start.glob(pattern.removeprefix(base)))
+            try:
+                matched = start.glob(pattern.removeprefix(base))
+                matches = sorted(str(p) for p in islice(matched, MOST_JOBS + 1))
+            except (ValueError, NotImplementedError, OSError) as error:
+                raise ManifestError(
+                    f"{self._text.where(place)}: {shown(pattern)} is no glob that can be used:"
+                    f" {error}"
+                ) from None
+            if len(matches) > MOST_JOBS:
+                raise ManifestError(
+                    f"{self._text.where(place)}: {shown(pattern)} matches more than"
+                    f" {MOST_JOBS:,} files"
+                )
             if photos:  # the IUV of photos lie beside them
                 matches = [m for m in matches if not Path(m).stem.lower().endswith("_iuv")]
             if not matches:
-                raise ManifestError(f"{self._text.where(place)}: {pattern!r} matches nothing")
+                raise ManifestError(f"{self._text.where(place)}: {shown(pattern)} matches nothing")
             found += matches
         return found
 
     def _output(self, place: Place, template: str, names: dict[str, Any]) -> _Output:
-        try:
-            written = template.format(**names)
-        except (KeyError, IndexError, ValueError, AttributeError):
+        if not _is_template(template):
             raise ManifestError(
-                f"{self._text.where(place)}: {template!r} is no template; known are {PLACEHOLDERS}"
+                f"{self._text.where(place)}: {shown(template)} is no template; known are"
+                f" {PLACEHOLDERS}"
+            )
+        written = template.format(**names)
+        try:
+            return self._find_output(place, written)
+        except (OSError, RuntimeError) as error:  # too long a name; links that go in circles
+            raise ManifestError(
+                f"{self._text.where(place)}: {shown(written)} cannot be an output: {error}"
             ) from None
+
+    def _find_output(self, place: Place, written: str) -> _Output:
+        """Find where an output lies. Raises: ManifestError, OSError, RuntimeError."""
         # text, not paths, and one look at the disk a folder: ten thousand jobs are read in a second
         path = f"{self._root}/{written.rstrip('/')}"
         folder, _, name = path.rpartition("/")
@@ -216,10 +249,27 @@ class _Spread:
             return _Output(path, str(Path(path).resolve()), written)
         if not inside or name in ("", ".", "..") or Path(path).is_symlink():
             raise ManifestError(
-                f"{self._text.where(place)}: {written!r} leaves the output root {self._root}; write"
-                " a path below it, or set outside_outputs: true"
+                f"{self._text.where(place)}: {shown(written)} leaves the output root {self._root};"
+                " write a path below it, or set outside_outputs: true"
             )
         return _Output(path, f"{real_folder}/{name}", written)
+
+
+def _is_template(text: str) -> bool:
+    """Tell whether a text holds no other placeholders than those that are known."""
+    try:
+        parts = list(Formatter().parse(text))
+    except ValueError:
+        return False
+    return all(
+        conversion is None
+        and (
+            (name == "index" and FORMAT.fullmatch(spec or ""))
+            or (name in ("source", "driver") and not spec)
+        )
+        for _, name, spec, conversion in parts
+        if name is not None
+    )
 
 
 def name_driver(driver: str) -> str:
@@ -228,8 +278,8 @@ def name_driver(driver: str) -> str:
 
 
 def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
-    """Say what is missing, once for each file; names are looked at, and nothing is opened."""
-    known: dict[Path, bool] = {}
+    """Say what cannot be read, once for each file; names are looked at, and nothing is opened."""
+    known: set[Path] = set()
     for job in jobs:
         options = job.options
         paths = [("source", options.source)]
@@ -241,10 +291,13 @@ def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
         paths += [("garment", garment.photo) for garment in options.garments]
         paths += [("audio", path) for path in audio_files(options)]
         for what, path in paths:
-            if path not in known:
-                known[path] = path.exists()
-                if not known[path]:
-                    yield f"job {job.index} ({job.name}): {what} {path} does not exist"
+            if path in known:
+                continue
+            known.add(path)
+            try:
+                check_readable(path, what, folder=what == "driver")
+            except InputError as error:
+                yield f"job {job.index} ({job.name}): {error}"
 
 
 # ten thousand jobs share a few paths, and what follows from their names

@@ -7,27 +7,26 @@ file is YAML, TOML or JSON; all three mean the same.
 from __future__ import annotations
 
 import difflib
-import json
-import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.structured import (
+    parse_structured,
+    read_structured,
+    shown,
+    shown_name,
+)
 from motion_transfer.option import Option, list_options
 from motion_transfer.render.options import RenderOptions
 
-SUFFIXES = (".yaml", ".yml", ".json", ".toml")
 MOST_ERRORS = 10  # a screenful: whoever mends those sees the next ones
 Place = tuple[int | str, ...]
 """Where a field stands in a manifest, such as `("jobs", 0, "output")`."""
-
-_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's: five times as fast
 
 # a name such as `source: 7` is a number to YAML
 STRICT = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
@@ -165,7 +164,7 @@ def read_manifest(path: Path, settings: Sequence[str] = ()) -> tuple[Manifest, M
     Raises: ManifestError naming file, line where possible, field, value and what is allowed.
     """
     text = ManifestText(path)
-    data = text.data()
+    data = text.data
     if not isinstance(data, dict):
         raise ManifestError(f"{path}: a manifest is a mapping with version and jobs")
     given = {_set(data, setting): setting for setting in settings}
@@ -176,64 +175,26 @@ def read_manifest(path: Path, settings: Sequence[str] = ()) -> tuple[Manifest, M
 
 
 class ManifestText:
-    """A manifest's text, which can say where a field stands."""
+    """A manifest as it was written, which can say where a field stands."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file. Raises: ManifestError if it cannot be, or has an unknown ending."""
+        """Read the file. Raises: ManifestError if it cannot be, naming the line where possible."""
         self.path = path
-        self._suffix = path.suffix.lower()
-        if self._suffix not in SUFFIXES:
-            raise ManifestError(f"{path}: unknown ending; supported are {', '.join(SUFFIXES)}")
         try:
-            self._text = path.read_text(encoding="utf-8")
-        except FileNotFoundError:
-            raise ManifestError(f"manifest {path} does not exist") from None
-        except (OSError, UnicodeDecodeError) as error:
-            raise ManifestError(f"manifest {path} cannot be read: {error}") from None
+            self._content = read_structured(path, "manifest")
+        except InputError as error:
+            raise ManifestError(str(error)) from None
 
+    @property
     def data(self) -> Any:
-        """Parse the content. Raises: ManifestError where the syntax is broken."""
-        try:
-            if self._suffix == ".toml":
-                return tomllib.loads(self._text)
-            if self._suffix == ".json":
-                return json.loads(self._text)
-            return yaml.load(self._text, Loader=_Loader)
-        except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
-            raise ManifestError(f"{self.path}: {error}") from None
-        except yaml.YAMLError as error:
-            mark = getattr(error, "problem_mark", None)
-            line = f":{mark.line + 1}" if mark else ""
-            reason = getattr(error, "problem", None) or str(error)
-            raise ManifestError(f"{self.path}{line}: {reason}") from None
-
-    def line(self, place: Place) -> int | None:
-        """Find the line, from 1, on which a field stands, or the nearest thing around it."""
-        if self._suffix == ".toml":
-            return self._toml_line(place)
-        # nodes know their lines, and JSON is YAML to this parser
-        node = yaml.compose(self._text, Loader=_Loader)
-        line: int | None = None
-        for step in place:
-            if isinstance(node, yaml.MappingNode):
-                pair = next(((k, v) for k, v in node.value if k.value == step), None)
-                if pair is None:
-                    break
-                line, node = pair[0].start_mark.line, pair[1]
-            elif isinstance(node, yaml.SequenceNode) and isinstance(step, int):
-                if step >= len(node.value):
-                    break
-                node = node.value[step]
-                line = node.start_mark.line
-            else:
-                break
-        return None if line is None else line + 1
+        """What it says."""
+        return self._content.data
 
     def where(self, place: Place) -> str:
         """Name file, line where possible, and field, for messages."""
-        line = self.line(place)
-        words = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in place).lstrip(".")
-        return f"{self.path}{f':{line}' if line else ''}: {words}"
+        line = self._content.line(place)
+        words = "".join(f"[{s}]" if isinstance(s, int) else f".{shown_name(s)}" for s in place)
+        return f"{self.path}{f':{line}' if line else ''}: {words.lstrip('.')}"
 
     def error(self, details: Sequence[ErrorDetails], given: Mapping[str, str]) -> ManifestError:
         """Say everything that is wrong, a line each.
@@ -260,26 +221,7 @@ class ManifestText:
             return f"{self.where(place)}: {_unknown(str(list(place)[-1]), _known_fields(place))}"
         if kind == "missing":
             return f"{self.where(place)}: is missing"
-        return f"{self.where(place)}: {value!r}: {_reason(detail)}"
-
-    def _toml_line(self, place: Place) -> int | None:
-        # Python's parser of TOML keeps no lines: headers are counted, then the key is looked for
-        lines = self._text.splitlines()
-        start = 0
-        if len(place) > 1:
-            header = re.compile(rf"\s*\[+\s*{re.escape(str(place[0]))}\s*\]+")
-            headers = [number for number, line in enumerate(lines) if header.match(line)]
-            index = place[1] if isinstance(place[1], int) else 0
-            if index >= len(headers):
-                return None
-            start = headers[index]
-        key = re.compile(rf"\s*{re.escape(str(list(place)[-1]))}\s*=")
-        for number in range(start, len(lines)):
-            if key.match(lines[number]):
-                return number + 1
-            if number > start and lines[number].startswith("["):
-                break
-        return start + 1 if start else None
+        return f"{self.where(place)}: {shown(value)}: {_reason(detail)}"
 
 
 def _known_fields(place: Place) -> list[str]:
@@ -312,8 +254,8 @@ def _set(data: dict[str, Any], setting: str) -> str:
     if not equals:
         raise ManifestError(f"--set {setting!r}; write key=value")
     try:
-        parsed = yaml.load(value, Loader=_Loader)
-    except yaml.YAMLError:
+        parsed = parse_structured(value, ".yaml", "--set").data
+    except InputError:
         parsed = value
     if parsed is None and value.strip() not in ("", "~", "null"):
         parsed = value  # such as #102030, which YAML takes for a comment

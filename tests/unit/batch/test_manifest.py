@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from pathlib import Path
 
@@ -208,7 +209,7 @@ def test_two_jobs_cannot_have_one_output(tmp_path: Path) -> None:
     ("text", "suffix", "words"),
     [
         ("version: 1\njobs: [", ".yaml", "shoot.yaml:"),
-        ('{"version": 1,', ".json", "line 1 column"),
+        ('{"version": 1,', ".json", "shoot.json:1: Expecting property name"),
         ("version = ]", ".toml", "line 1"),
         ("version: 2\njobs: []\n", ".yaml", "shoot.yaml:1: version: 2: Input should be 1"),
         ("jobs: []\n", ".yaml", "version: is missing"),
@@ -255,3 +256,59 @@ def test_many_jobs_are_read_quickly(tmp_path: Path) -> None:
     began = time.process_time()
     assert len(jobs_of(path)) == 10_000
     assert time.process_time() - began < 3  # it takes 1 s of an idle core
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"frames": "3:9"}, ""),  # no quotes: YAML 1.1 would read 189
+        ({"output": "'{source.__class__}.mp4'"}, "is no template"),
+        ({"output": "'{index:999999999}.mp4'"}, "is no template"),
+        ({"output": "'{index!r}.mp4'"}, "is no template"),
+        ({"output": "'{}.mp4'"}, "is no template"),
+        ({"output": "'{index:04}.mp4'"}, ""),
+        ({"output": "n" * 300 + "/a/b.mp4"}, "cannot be an output: [Errno 36] File name too long"),
+        ({"output": "loop/a.mp4"}, "cannot be an output: Symlink loop"),
+        ({"source": "'**x'"}, "is no glob that can be used"),
+        ({"fps": "1e400"}, "shoot.yaml:7: '1e400' is no number that can be used"),
+        ({"fps": ".nan"}, "fps '.nan'; write a number"),
+        ({"priority": "9" * 5000}, "shoot.yaml:7: '99999"),
+        ({"crf": "³"}, "Input should be a valid integer"),
+        ({"crf": "18\n    crf: 20"}, "shoot.yaml:8: crf stands here, and in line 7, too"),
+        ({"'a\\nb'": "1"}, r"jobs[0].'a\\nb': unknown field"),
+        ({"size": "x" * 5000}, "'" + "x" * 56 + "...: Input should be"),
+    ],
+)
+def test_odd_values_are_one_line(tmp_path: Path, words: dict[str, str], message: str) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    path = write(tmp_path, job_text(**words))
+    if not message:
+        assert len(jobs_of(path)) == 1
+        return
+    assert message in refusal(path)
+    assert len(refusal(path).splitlines()) == 1
+
+
+def test_frames_need_no_quotes(tmp_path: Path) -> None:
+    assert jobs_of(write(tmp_path, job_text(frames="3:9")))[0].options.frames == (3, 9)
+
+
+def test_a_matrix_too_large_is_refused(tmp_path: Path) -> None:
+    names = ", ".join(f"n{number}" for number in range(400))
+    text = (
+        f"version: 1\nmatrix:\n  - sources: [{names}]\n    drivers: [{names}]\n"
+        "    output: '{index}.mp4'\n"
+    )
+    assert "shoot.yaml:3: matrix[0]: more than 100,000 jobs; split" in refusal(
+        write(tmp_path, text)
+    )
+
+
+def test_inputs_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    text = job_text(source="pipe", driver="n" * 300)
+    assert list(check_inputs(jobs_of(write(tmp_path, text)))) == [
+        f"job 0 (a.mp4): source {tmp_path}/pipe is a device or a pipe; write its content to a file,"
+        " and name that",
+        f"job 0 (a.mp4): driver {tmp_path}/{'n' * 300} cannot be read: File name too long",
+    ]
