@@ -9,7 +9,6 @@ from functools import cache
 from typing import Any, Literal
 
 from motion_transfer.batch.expand import Job
-from motion_transfer.batch.state import Files
 from motion_transfer.batch.tasks import ChunkOutline, Fetch, Outline
 from motion_transfer.media.work import WorkFolder, key_of
 from motion_transfer.option import part_of
@@ -47,14 +46,12 @@ class Shared:
         name: Tells it from others, see `scan_name` and `source_name`.
         users: How many of those jobs have not ended.
         blobs: The result, by kind, as `Workers.share` gave it.
-        files: What it was made from, see `sign_files`.
     """
 
     name: str
     users: int
     state: Literal["missing", "pending", "ready", "failed"] = "missing"
     blobs: dict[str, Fetch] = field(default_factory=dict)
-    files: Files = field(default_factory=dict)
     error: str = ""
 
 

@@ -13,16 +13,18 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from motion_transfer.batch import events, tasks
 from motion_transfer.batch.active import ActiveJob, Shared, scan_name, source_name
 from motion_transfer.batch.expand import Job
 from motion_transfer.batch.signals import Signals
-from motion_transfer.batch.state import BatchState, Files, file_status, is_current, is_ours, sign
+from motion_transfer.batch.state import BatchState, is_current, is_ours, sign
 from motion_transfer.batch.workers import Workers
 from motion_transfer.errors import InputError, MotionTransferError, OutputError
 from motion_transfer.media.publish import check_destination, explain_disk_errors
+from motion_transfer.media.unchanged import status_key
 from motion_transfer.media.work import WorkFolder, was_published
 
 POLL_SECONDS = 0.5  # how soon a signal is heeded
@@ -88,7 +90,7 @@ class Scheduler:
         self._running: dict[Future[Any], tuple[int, Task]] = {}
         self._last: dict[int, tuple[str, int]] = {}  # by place: what it decoded, driver and start
         self._halted = False
-        self._status_of = cache(file_status)  # thousands of jobs have a few inputs
+        self._status_of = cache(status_key)  # thousands of jobs have a few inputs
         self._waiting = self._order(self.jobs)
 
     def run(self) -> Tally:
@@ -191,7 +193,7 @@ class Scheduler:
             if active.scan.state == active.source.state == "ready":
                 active.stage = "preparing"
                 blobs = (active.scan.blobs["scan"], active.source.blobs["source"])
-                return Task(tasks.prepare, (options, *blobs, active.source.files), active)
+                return Task(tasks.prepare, (options, *blobs), active)
         elif active.stage == "rendering" and active.todo:
             return self._chunk_task(active, place)
         elif active.stage == "rendering" and not active.left and not active.running:
@@ -274,31 +276,33 @@ class Scheduler:
         if active.error and not active.running:
             self._end(active)
 
-    def _scan_done(self, task: Task, result: tuple[bytes, Files, list[str]]) -> None:
-        blob, files, notices = result
-        self._ready(task, files, {"scan": (task.owner.scan.name, blob)})
+    def _scan_done(self, task: Task, result: tuple[bytes, list[str]]) -> None:
+        blob, notices = result
+        self._ready(task, {"scan": (task.owner.scan.name, blob)})
         for notice in notices:
             self.listener(events.JobNotice(task.owner.name, notice))
 
-    def _encode_done(self, task: Task, result: tuple[bytes, bytes, Files]) -> None:
-        source, appearance, files = result
+    def _encode_done(self, task: Task, result: tuple[bytes, bytes, tuple[str, ...]]) -> None:
+        source, appearance, notices = result
         name = task.owner.source.name
         blobs = {"source": (f"source-{name}", source), "appearance": (name, appearance)}
-        self._ready(task, files, blobs)
+        self._ready(task, blobs)
         self.feature_maps += 1
+        for notice in notices:
+            self.listener(events.JobNotice(task.owner.name, notice))
 
-    def _ready(self, task: Task, files: Files, blobs: dict[str, tuple[str, bytes]]) -> None:
+    def _ready(self, task: Task, blobs: dict[str, tuple[str, bytes]]) -> None:
         assert task.shared is not None
         for kind, (name, blob) in blobs.items():
             task.shared.blobs[kind] = self.workers.share(name, blob)
-        task.shared.files, task.shared.state = files, "ready"
+        task.shared.state = "ready"
 
     def _prepare_done(self, task: Task, result: tuple[bytes, tasks.Outline]) -> None:
         active = task.owner
         blob, outline = result
         active.outline = outline
         if active.work.published(outline.output_key):  # by a run that was killed right after it
-            self._succeed(active, None, {})
+            self._succeed(active, None)
             return
         options = active.job.options
         # somebody else may have put it there since the job began
@@ -319,17 +323,16 @@ class Scheduler:
             task.owner.left -= 1
             self.listener(events.JobFrames(task.owner.name, chunk.stop - chunk.start))
 
-    def _assemble_done(self, task: Task, result: tuple[Any, ...]) -> None:
-        finished, posters, files = result
+    def _assemble_done(self, task: Task, result: tuple[Path, bool]) -> None:
+        finished, posters = result
         assert task.owner.outline is not None
         task.owner.work.publish(finished, task.owner.outline.output_key)
-        self._succeed(task.owner, posters, files)
+        self._succeed(task.owner, posters)
 
-    def _succeed(self, active: ActiveJob, posters: bool | None, audio: Files) -> None:
+    def _succeed(self, active: ActiveJob, posters: bool | None) -> None:
         outline, output = active.outline, active.job.options.output
         assert outline is not None
         seconds = time.monotonic() - active.began
-        files = {**active.scan.files, **active.source.files, **audio}
         self.state.record(
             {
                 **_facts(active, "done", seconds),
@@ -338,7 +341,7 @@ class Scheduler:
                 "renderer": outline.renderer,
                 "note": outline.note or None,
                 "poster": posters,
-                "signature": sign(active.job.options, files),
+                "signature": sign(active.job.options, outline.files),
             }
         )
         active.work.clear()

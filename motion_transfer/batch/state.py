@@ -1,24 +1,24 @@
 """What a batch remembers between runs: its folder, its lock, a journal of jobs, and their files.
 
-Whether the files that an output was made from are still the same is told without decoding them, as
-a version control system's index does: size and times that did not change mean content that did not
-change; where they did, the content itself decides.
+Whether the files that an output was made from are still the same is told without decoding them, see
+`media/unchanged.py`.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.media.iuv.formats import find_iuv_of, names_file
 from motion_transfer.media.publish import explain_disk_errors
-from motion_transfer.media.work import Journal, WorkFolder, digest_of, key_of, locked, work_path
+from motion_transfer.media.unchanged import content_key
+from motion_transfer.media.work import Journal, WorkFolder, key_of, locked, work_path
 from motion_transfer.option import list_options
-from motion_transfer.render.options import NO_AUDIO, DriverOptions, OutputOptions, RenderOptions
+from motion_transfer.render.inputs import appearance_files, audio_files, motion_files
+from motion_transfer.render.options import RenderOptions
 from motion_transfer.version import __version__
 
 NOT_DRAWN = ("workers", "restart", "force")
@@ -30,56 +30,7 @@ Record = dict[str, Any]
 
 Signature = dict[str, Any]
 Files = dict[str, list[str]]
-"""By path: a key of its status, and the digest of its content."""
-
-
-def source_files(options: RenderOptions) -> Iterator[Path]:
-    """List what a source's appearance is made from. Raises: InputError if a photo is missing."""
-    photos = [(options.source, options.source_iuv)]
-    photos += [(garment.photo, garment.iuv) for garment in options.garments]
-    for photo, given in photos:
-        yield photo
-        if iuv := given or find_iuv_of(photo):
-            yield iuv
-    yield from options.weights_files
-    if options.estimator_model is not None:
-        yield options.estimator_model
-
-
-def driver_files(options: DriverOptions) -> Iterator[Path]:
-    """List the driver, unless it is a motion."""
-    if names_file(options.driver):
-        yield options.driver
-
-
-def audio_files(options: OutputOptions) -> Iterator[Path]:
-    """List the sound, if a file is named."""
-    if options.audio is not None and str(options.audio) != NO_AUDIO:
-        yield options.audio
-
-
-def sign_files(paths: Iterable[Path]) -> Files:
-    """Note status and digest of files and folders; to be called before they are read.
-
-    Raises: InputError naming one that does not exist.
-    """
-    try:
-        return {str(path): [file_status(path), digest_of(path)] for path in paths}
-    except FileNotFoundError as error:
-        raise InputError(f"{error.filename} does not exist") from None
-
-
-def check_unchanged(files: Files) -> None:
-    """Raise InputError if a file is not what it was when it was signed."""
-    for name, (status, digest) in files.items():
-        path = Path(name)
-        try:
-            # a file that was only touched is read again, and found the same
-            unchanged = status == file_status(path) or digest == digest_of(path)
-        except FileNotFoundError:
-            raise InputError(f"{path} does not exist") from None
-        if not unchanged:
-            raise InputError(f"{path} has changed since the batch began; start it again")
+"""By path: a key of its status, and one of its content, see `Inputs.keys`."""
 
 
 def sign(options: RenderOptions, files: Files) -> Signature:
@@ -93,18 +44,18 @@ def is_current(
     """Tell whether the output is there, untouched, and made from these options and this content.
 
     Args:
-        status_of: `file_status`, which may remember the inputs that jobs share.
+        status_of: `status_key`, which may remember the inputs that jobs share.
     """
     try:
         if signature["options"] != _options_key(options):
             return False
         if signature["output"] != file_status(options.output):
             return False
-        parts = (driver_files(options), source_files(options), audio_files(options))
+        parts = (motion_files(options), appearance_files(options), audio_files(options))
         paths = {str(path): path for part in parts for path in part}
         return paths.keys() == signature["files"].keys() and all(
             signature["files"][name][0] == status_of(path)
-            or signature["files"][name][1] == digest_of(path)
+            or signature["files"][name][1] == content_key(path)
             for name, path in paths.items()
         )
     except (OSError, InputError, KeyError):
@@ -125,7 +76,7 @@ def _options_key(options: RenderOptions) -> str:
 
 
 def file_status(path: Path) -> str:
-    """Make a key of size, time and inode of a file, or of a folder's files. Raises: OSError."""
+    """Make a key of size, time and inode of an output, or of a folder's files. Raises: OSError."""
     files = sorted(f for f in path.iterdir() if f.is_file()) if path.is_dir() else [path]
     return key_of({f.name: [(s := f.stat()).st_size, s.st_mtime_ns, s.st_ino] for f in files})
 

@@ -13,14 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motion_transfer.batch.state import (
-    Files,
-    audio_files,
-    check_unchanged,
-    driver_files,
-    sign_files,
-    source_files,
-)
+from motion_transfer.batch.state import Files
+from motion_transfer.media.unchanged import Inputs
 from motion_transfer.render.options import RenderOptions
 
 if TYPE_CHECKING:  # the scheduler imports this module, and has no need of the libraries below
@@ -64,6 +58,7 @@ class Outline:
         chunks_at_once: How many chunks one task renders.
         output_key: That of the whole output.
         note: Says in which frames nobody was found; empty if there are none.
+        files: What it is made from.
     """
 
     chunks: tuple[ChunkOutline, ...]
@@ -73,6 +68,7 @@ class Outline:
     chunks_at_once: int
     output_key: str
     note: str
+    files: Files
 
 
 class Warm:
@@ -96,12 +92,12 @@ WARM = Warm()
 """Kept by this worker process."""
 
 
-def scan(options: RenderOptions, folder: Path) -> tuple[bytes, Files, list[str]]:
+def scan(options: RenderOptions, folder: Path) -> tuple[bytes, list[str]]:
     """Look through a driver.
 
     Args:
         folder: Where the IUV of drivers is kept that are raw pictures.
-    Returns: The scan, the driver's files, and what is worth saying.
+    Returns: The scan, and what is worth saying.
     Raises: InputError, IuvFileError.
     """
     from motion_transfer.events import Event, Notice
@@ -113,34 +109,33 @@ def scan(options: RenderOptions, folder: Path) -> tuple[bytes, Files, list[str]]
         if isinstance(event, Notice):
             notices.append(event.message)
 
-    files = sign_files(driver_files(options))
     scanned = scan_driver(options, folder, listen, workers=1)
-    return pickle.dumps(scanned, PICKLE_PROTOCOL), files, notices
+    return pickle.dumps(scanned, PICKLE_PROTOCOL), notices
 
 
-def encode(options: RenderOptions) -> tuple[bytes, bytes, Files]:
+def encode(options: RenderOptions) -> tuple[bytes, bytes, tuple[str, ...]]:
     """Read a source and compute its appearance, the feature map.
 
-    Returns: The source, its appearance, its files.
+    Returns: The source with what it was read from, its appearance, and what is worth saying.
     Raises: InputError, WeightsError.
     """
     from motion_transfer.render.composition import open_recipe
+    from motion_transfer.render.inputs import appearance_files
     from motion_transfer.render.source import read_source
 
-    files = sign_files(source_files(options))  # before: what changes while it is read is noticed
+    inputs = Inputs(appearance_files(options))
     recipe = open_recipe(options)
     source = read_source(options, recipe.texture_size)
     appearance = recipe.appearance_of(source)
-    return pickle.dumps(source, PICKLE_PROTOCOL), pickle.dumps(appearance, PICKLE_PROTOCOL), files
+    told = pickle.dumps((source, inputs), PICKLE_PROTOCOL)
+    return told, pickle.dumps(appearance, PICKLE_PROTOCOL), source.notes
 
 
-def prepare(
-    options: RenderOptions, scanned: Fetch, source: Fetch, source_files: Files
-) -> tuple[bytes, Outline]:
+def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[bytes, Outline]:
     """Plan a run and put its parts together.
 
     Raises: InputError and its kinds, also if a source is no longer what its appearance was made
-        from: chunks are keyed by what its files hold now.
+        from.
     """
     from motion_transfer.events import ignore
     from motion_transfer.render.composition import open_recipe, plan_run, prepare_run
@@ -151,8 +146,8 @@ def prepare(
     driver = pickle.loads(scanned())
     plan = plan_run(options, driver)
     recipe = open_recipe(options)
-    run = prepare_run(options, driver, plan, recipe, pickle.loads(source()), ignore)
-    check_unchanged(source_files)
+    source, inputs = pickle.loads(encoded())
+    run = prepare_run(options, driver, plan, recipe, source, inputs, ignore)
     chunks = tuple(
         ChunkOutline(c.index, c.start, c.stop, piece_of(run, c), run.chunk_keys[c.index])
         for c in plan.chunks
@@ -166,6 +161,7 @@ def prepare(
         CHUNKS_AT_ONCE if recipe.occupies != "nothing" else 1,
         output_key(run),
         describe_missing(plan.frames, plan.first, plan.frame_rate),
+        run.inputs.keys(),
     )
     return pickle.dumps(run, PICKLE_PROTOCOL), outline
 
@@ -219,12 +215,12 @@ def render(
 
 def assemble(
     options: RenderOptions, prepared: Fetch, folder: Path, pictures: Path
-) -> tuple[Path, bool, Files]:
+) -> tuple[Path, bool]:
     """Join finished segments, and make the report's pictures.
 
     Args:
         pictures: What their names begin with, see `write_posters`.
-    Returns: The output without its name yet, whether it has pictures, its sound's file.
+    Returns: The output without its name yet, and whether it has pictures.
     """
     from motion_transfer.batch.report import write_posters
     from motion_transfer.media.publish import explain_disk_errors
@@ -232,12 +228,11 @@ def assemble(
     from motion_transfer.render.run import assemble as join
 
     run: Prepared = pickle.loads(prepared())
-    files = sign_files(audio_files(options))
     sheet = ContactSheet(folder, len(run.plan.frames)) if options.sheet else None
     with explain_disk_errors(options.output):
         finished = join(options, run, folder, sheet)
     posters = write_posters(options.source, finished, pictures)
-    return finished, posters, files
+    return finished, posters
 
 
 class _SharedFrames:

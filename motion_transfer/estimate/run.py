@@ -17,6 +17,7 @@ from motion_transfer.estimate.opening import check_estimator, open_estimator
 from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.writing import VIDEO_RATE, IuvOutput, check_iuv_output, write_iuv
 from motion_transfer.media.pictures.formats import open_pictures
+from motion_transfer.media.unchanged import Inputs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +74,10 @@ def estimate_iuv(
     Args:
         done: Called with 1 and the number of all frames after each frame.
         estimator: One that is ready; None opens the one that the options name.
-    Raises: InputError and its kinds; nothing half-written stays behind.
+    Raises: InputError and its kinds, also for a source that changes meanwhile; nothing half-written
+        stays behind.
     """
+    inputs = Inputs(filter(None, (options.source, options.model)))
     pictures = open_pictures(options.source)
     rate = options.frame_rate or pictures.frame_rate
     settings = IuvOutput(
@@ -101,5 +104,10 @@ def estimate_iuv(
         with_alpha=options.alpha,
     )
     with closing(frames):
-        write_iuv(frames, options.output, settings, lambda count: done(count, pictures.frame_count))
+        write_iuv(
+            inputs.guard(frames),
+            options.output,
+            settings,
+            lambda count: done(count, pictures.frame_count),
+        )
     return EstimateReport(summary, rate or VIDEO_RATE, pictures.notes)

@@ -22,8 +22,10 @@ from motion_transfer.errors import OutputError
 from motion_transfer.events import Listener, Notice
 from motion_transfer.media.output.audio import AudioCut, choose_audio
 from motion_transfer.media.output.formats import OutputFormat, choose_format
+from motion_transfer.media.unchanged import Inputs
 from motion_transfer.render.content import chunk_key, run_key
 from motion_transfer.render.driver import DriverFile, DriverScan, scan_driver
+from motion_transfer.render.inputs import appearance_files, audio_files
 from motion_transfer.render.options import (
     DEFAULT_RATE,
     OutputOptions,
@@ -41,6 +43,7 @@ class Prepared:
 
     Attributes:
         chunk_keys: Of the content that each chunk is made from.
+        inputs: All files that it is made from.
     """
 
     driver: DriverFile
@@ -50,6 +53,7 @@ class Prepared:
     output_format: OutputFormat
     audio: AudioCut | None
     chunk_keys: tuple[str, ...]
+    inputs: Inputs
 
 
 @dataclass(frozen=True)
@@ -83,9 +87,12 @@ def compose(
     scan = scan_driver(options, folder, listener, workers=options.worker_count)
     scanned(scan)
     plan = plan_run(options, scan)
+    inputs = Inputs(appearance_files(options))
     recipe = open_recipe(options)
     source = read_source(options, recipe.texture_size)
-    prepared = prepare_run(options, scan, plan, recipe, source, listener)
+    for note in source.notes:
+        listener(Notice(note))
+    prepared = prepare_run(options, scan, plan, recipe, source, inputs, listener)
     return Composed(prepared, recipe.appearance_of(source))
 
 
@@ -125,12 +132,17 @@ def prepare_run(
     plan: DriverPlan,
     recipe: Recipe,
     source: Source,
+    inputs: Inputs,
     listener: Listener,
 ) -> Prepared:
     """Put the parts together; the network is loaded, and compiled if it is to be.
 
-    Raises: InputError and its kinds, OutputError for an output that cannot hold the run.
+    Args:
+        inputs: What recipe and source were read from.
+    Raises: InputError and its kinds, also if an input has changed since it was noted: chunks are
+        keyed by what the files hold now; OutputError for an output that cannot hold the run.
     """
+    inputs |= scan.inputs | Inputs(audio_files(options))
     output_format = read_format(options)
     _check_length(options, output_format, plan)
     recipe = recipe.made_ready(
@@ -149,7 +161,7 @@ def prepare_run(
     working_size = recipe.working_size(plan.largest_side)
     canvas = make_canvas(options, scan.height, scan.width, working_size, source)
     _check_size(options, output_format, canvas)
-    return Prepared(
+    prepared = Prepared(
         driver=scan.file,
         plan=plan,
         recipe=recipe,
@@ -166,7 +178,10 @@ def prepare_run(
             duration_seconds=len(plan.frames) / plan.frame_rate,
         ),
         chunk_keys=tuple(chunk_key(key, plan, chunk) for chunk in plan.chunks),
+        inputs=inputs,
     )
+    inputs.check()
+    return prepared
 
 
 def is_in_place(options: RenderOptions, source: Source) -> bool:

@@ -17,7 +17,9 @@ from motion_transfer.media.folders import list_gaps
 from motion_transfer.media.iuv.formats import ChannelOrder, Missing, names_file
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvReader
+from motion_transfer.media.unchanged import Inputs
 from motion_transfer.people import FIRST_USE, is_cached, is_motion
+from motion_transfer.render.inputs import motion_files
 from motion_transfer.render.options import InputOptions
 from motion_transfer.render.picture_driver import ORDER, PictureDriver, estimate_driver
 from motion_transfer.render.plan import SeenFrame, frame_range, scan_people
@@ -48,6 +50,7 @@ class Driver:
         path: What the options name.
         reader: Of its IUV.
         frame_rate: Its own, if it has one.
+        inputs: What it is read from.
         pictures: What was made of it, if it is raw pictures.
     """
 
@@ -55,6 +58,7 @@ class Driver:
     file: DriverFile
     reader: IuvReader
     frame_rate: Fraction | None
+    inputs: Inputs
     pictures: PictureDriver | None = None
 
     @property
@@ -85,6 +89,7 @@ class Driver:
             seen=seen,
             where_first=self.where(chosen.start),
             where_found=self.where(chosen.start + found),
+            inputs=self.inputs,
             pictures=self.pictures,
         )
 
@@ -100,6 +105,7 @@ class DriverScan:
         start_seconds: When its first frame is shown, on the clock of its sound.
         where_first, where_found: The first of the frames, and the first of them with somebody (if
             there is one), for messages.
+        inputs: What the driver is read from.
         pictures: What was made of the driver, if it is raw pictures.
     """
 
@@ -113,6 +119,7 @@ class DriverScan:
     seen: list[SeenFrame]
     where_first: str
     where_found: str
+    inputs: Inputs
     pictures: PictureDriver | None = None
 
 
@@ -124,10 +131,11 @@ def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driv
     Raises: InputError if there is no such driver, it cannot be told what it is, or an option does
         not go with it.
     """
+    inputs = Inputs(motion_files(options))
     if _are_pictures(options):
-        pictures = estimate_driver(options, folder, listener)
+        pictures = estimate_driver(options, folder, listener, inputs)
         file = DriverFile(pictures.iuv, "fail", ORDER)
-        return Driver(options.driver, file, file.open(), pictures.frame_rate, pictures)
+        return Driver(options.driver, file, file.open(), pictures.frame_rate, inputs, pictures)
     if options.fit_body:
         raise InputError(
             f"--fit-body compares landmarks, and IUV as in the driver {options.driver} has none;"
@@ -144,7 +152,7 @@ def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driv
         listener(Notice(note))
     reader = open_reader(stream, options.iuv_order)
     file = DriverFile(options.driver, missing, reader.order)
-    return Driver(options.driver, file, reader, stream.frame_rate)
+    return Driver(options.driver, file, reader, stream.frame_rate, inputs)
 
 
 def scan_driver(
@@ -155,7 +163,8 @@ def scan_driver(
     Args:
         folder: Where the IUV of pictures is kept.
         workers: Threads that decode.
-    Raises: InputError; IuvFileError naming the frame that is broken.
+    Raises: InputError, also for a driver that changes meanwhile; IuvFileError naming the frame that
+        is broken.
     """
     driver = open_driver(options, folder, listener)
     chosen = frame_range(options.frames, driver.frame_count, str(options.driver))
@@ -167,6 +176,7 @@ def scan_driver(
         lambda count: listener(FramesDone(count)),
         find=driver.people_in,
     )
+    driver.inputs.check()
     return driver.scan_of(chosen, seen)
 
 

@@ -74,7 +74,8 @@ class Engine:
 
         Args:
             threads: How many draw.
-        Raises: the first thread's error, after all threads have stopped.
+        Raises: the first thread's error, after all threads have stopped; InputError if the run's
+            inputs change meanwhile.
         """
         drawers = {"core": threads, "device": 1, "nothing": 0}[self._renderer.occupies]
         with (
@@ -118,6 +119,7 @@ class Engine:
                     index += 1
                 self._listener(FramesDone(len(frames)))
         finished(chunk, path)
+        self._prepared.inputs.glance()
 
     def _render_batches(self, chunk: Chunk) -> Iterator[list[Frame]]:
         """Make a chunk's output frames in batches, which begin where chunk or shot does."""

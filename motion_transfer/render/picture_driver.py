@@ -32,6 +32,7 @@ from motion_transfer.media.pictures.formats import open_pictures
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.media.publish import publish
+from motion_transfer.media.unchanged import Inputs
 from motion_transfer.media.work import digest_of
 from motion_transfer.render.content import driver_key
 from motion_transfer.render.options import InputOptions, SourceOptions
@@ -68,26 +69,32 @@ class PictureDriver:
     notes: tuple[str, ...]
 
 
-def estimate_driver(options: InputOptions, folder: Path, listener: Listener) -> PictureDriver:
+def estimate_driver(
+    options: InputOptions, folder: Path, listener: Listener, inputs: Inputs
+) -> PictureDriver:
     """Find the IUV of a driver's person, or take that of an earlier run of the same content.
 
     Args:
         folder: Where the result is kept.
-    Raises: InputError if nobody is found, or what it takes to look is missing.
+        inputs: What it is found in; noted, and not yet read.
+    Raises: InputError if nobody is found, what it takes to look is missing, or the inputs change
+        meanwhile: what is kept is made from what its key says.
     """
     key = driver_key(options)
     iuv = folder / f"driver-{key[:16]}.mkv"
     facts = iuv.with_suffix(".json")
     driver = _read(iuv, facts, key)
     if driver is None:
-        driver = _make(options, iuv, key, listener)
+        driver = _make(options, iuv, key, listener, inputs)
         _write(driver, facts)
     for note in driver.notes:
         listener(Notice(note))
     return driver
 
 
-def _make(options: InputOptions, iuv: Path, key: str, listener: Listener) -> PictureDriver:
+def _make(
+    options: InputOptions, iuv: Path, key: str, listener: Listener, inputs: Inputs
+) -> PictureDriver:
     pictures = open_pictures(options.driver)
     chosen = frame_range(options.frames, pictures.frame_count, str(options.driver))
     fit = _match_body(options, pictures, chosen, listener) if options.fit_body else None
@@ -105,7 +112,8 @@ def _make(options: InputOptions, iuv: Path, key: str, listener: Listener) -> Pic
         frame_count=chosen.stop, height=pictures.height, width=pictures.width, order=ORDER
     )
     with closing(frames):
-        write_iuv(frames, written, settings, lambda count: listener(FramesDone(count)))
+        guarded = inputs.guard(frames)
+        write_iuv(guarded, written, settings, lambda count: listener(FramesDone(count)))
     digest = digest_of(written)
     publish(written, iuv)
     return PictureDriver(

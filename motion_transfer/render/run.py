@@ -151,7 +151,10 @@ def output_key(prepared: Prepared) -> str:
 def assemble(
     options: OutputOptions, prepared: Prepared, folder: Path, sheet: ContactSheet | None
 ) -> Path:
-    """Join the segments in a work folder to an output without its name yet; write the sheet."""
+    """Join the segments in a work folder to an output without its name yet; write the sheet.
+
+    Raises: InputError if an input has changed since the run began.
+    """
     finished = folder / f"finished.part-0{options.output.suffix.lower()}"
     segments = [
         (folder / piece_of(prepared, chunk), chunk.stop - chunk.start)
@@ -160,6 +163,7 @@ def assemble(
     join_segments(
         segments, finished, prepared.output_format, prepared.plan.frame_rate, prepared.audio
     )
+    prepared.inputs.check()
     if sheet is not None and options.sheet is not None:
         with work_folder(options.sheet) as place:
             write_png(place / "sheet.png", sheet.picture())

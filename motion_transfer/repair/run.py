@@ -150,11 +150,11 @@ def repair_iuv(options: RepairOptions, done: Callable[[int], object] = int) -> R
         done: Called with 1 after each frame.
     Raises: InputError and its kinds; nothing half-written stays behind.
     """
-    reader, settings, notes = open_source(options)
+    source = open_source(options)
     before, after = FlickerMeter(), FlickerMeter()
-    frames = before.watch(reader.read(0, settings.frame_count))
-    write_iuv(after.watch(repair(frames, options)), options.output, settings, done)
-    return RepairReport(before.result, after.result, tuple(notes))
+    frames = before.watch(source.frames())
+    write_iuv(after.watch(repair(frames, options)), options.output, source.settings, done)
+    return RepairReport(before.result, after.result, tuple(source.notes))
 
 
 def remove_speckles(iuv: Frame, smallest_px: int) -> Frame:

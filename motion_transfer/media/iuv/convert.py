@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
 
 from motion_transfer.media.folders import list_gaps
 from motion_transfer.media.iuv.formats import ChannelOrder, Missing
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.iuv.writing import IuvOutput, write_iuv
+from motion_transfer.media.unchanged import Inputs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +27,7 @@ class ConvertOptions:
         output: A folder of PNG, `.mkv`, `.npy`, or `.png` for one frame.
         iuv_order: Forces the channel order of the source.
         output_order: The channel order to write, for pictures and video.
-        missing: What a number missing from a folder does.
+        missing: What a number missing from a folder or a dump does.
         frame_rate: The rate of a video; None for the source's, or 30.
         force: Whether to replace an existing output.
     """
@@ -37,12 +41,29 @@ class ConvertOptions:
     force: bool = False
 
 
-def open_source(options: ConvertOptions) -> tuple[IuvReader, IuvOutput, list[str]]:
-    """Open what is to be converted.
+@dataclass(frozen=True)
+class OpenedSource:
+    """What is to be converted.
 
-    Returns: The reader, what will be written, and notes for the user.
-    Raises: InputError.
+    Attributes:
+        settings: What will be written.
+        notes: For the user.
+        inputs: What it is read from.
     """
+
+    reader: IuvReader
+    settings: IuvOutput
+    notes: list[str]
+    inputs: Inputs
+
+    def frames(self) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
+        """Read every frame. Raises: InputError, also if the source changes meanwhile."""
+        return self.inputs.guard(self.reader.read(0, self.settings.frame_count))
+
+
+def open_source(options: ConvertOptions) -> OpenedSource:
+    """Open what is to be converted. Raises: InputError."""
+    inputs = Inputs([options.source])
     stream = open_stream(options.source, missing=options.missing)
     reader = open_reader(stream, options.iuv_order)
     notes = list(stream.notes)
@@ -57,7 +78,7 @@ def open_source(options: ConvertOptions) -> tuple[IuvReader, IuvOutput, list[str
         frame_rate=options.frame_rate or stream.frame_rate,
         force=options.force,
     )
-    return reader, settings, notes
+    return OpenedSource(reader, settings, notes, inputs)
 
 
 def convert_iuv(
@@ -70,6 +91,6 @@ def convert_iuv(
     Returns: What was written, and notes for the user.
     Raises: InputError and its kinds; nothing half-written stays behind.
     """
-    reader, settings, notes = open_source(options)
-    write_iuv(reader.read(0, settings.frame_count), options.output, settings, done)
-    return settings, [*notes, *reader.stream.closing_notes()]
+    source = open_source(options)
+    write_iuv(source.frames(), options.output, source.settings, done)
+    return source.settings, [*source.notes, *source.reader.stream.closing_notes()]
