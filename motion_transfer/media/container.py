@@ -19,6 +19,7 @@ import av.logging
 from av.container import InputContainer, OutputContainer
 from av.stream import Disposition
 
+from motion_transfer.errors import InputError
 from motion_transfer.media.files import check_readable
 
 LARGEST_PICTURE = 2**27
@@ -64,13 +65,23 @@ def open_input(path: Path, what: str = "video") -> Iterator[InputContainer]:
                 codec.flush_buffers()
 
 
-def find_pictures(container: InputContainer) -> av.VideoStream | None:
-    """Find the first stream of pictures that can be decoded; the cover of a song is none."""
-    for stream in container.streams.video:
-        is_cover = stream.disposition & Disposition.attached_pic
-        if not is_cover and stream.codec_context is not None:
-            return stream
-    return None
+def find_pictures(container: InputContainer, where: str) -> av.VideoStream:
+    """Find the first stream of pictures; the cover of a song is none.
+
+    Args:
+        where: Names the file, for messages.
+    Raises: InputError if there is none that can be decoded.
+    """
+    streams = [
+        stream
+        for stream in container.streams.video
+        if not stream.disposition & Disposition.attached_pic
+    ]
+    decodable = [stream for stream in streams if stream.codec_context is not None]
+    if not decodable:
+        reason = "in a codec that is known here" if streams else "in it"
+        raise InputError(f"{where} has no pictures {reason}; export it again, or name another file")
+    return decodable[0]
 
 
 def open_output(

@@ -118,5 +118,5 @@ def _frames(path: Path) -> Iterator[Frame]:
             yield from islice(open_pictures(path).read(), 1, None)  # it may hold several
         elif path.is_file():
             with open_input(path, "driver") as container:
-                for frame in container.decode(find_pictures(container)):
+                for frame in container.decode(find_pictures(container, f"driver {path}")):
                     yield frame.to_ndarray(format="rgb24")

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
 
 import av
 import av.logging
@@ -38,9 +37,7 @@ class VideoStream(IuvStream):
     def __init__(self, path: Path) -> None:
         try:
             with open_input(path, "driver") as container:
-                stream = find_pictures(container)
-                if stream is None:
-                    raise IuvFileError(f"driver {path} has no video in it that FFmpeg can decode")
+                stream = find_pictures(container, f"driver {path}")
                 codec, pixels = stream.codec_context.name, stream.codec_context.pix_fmt or ""
                 _check_lossless(path, container, stream)
                 # frames are found by these times: containers differ in how they count frames
@@ -73,7 +70,7 @@ class VideoStream(IuvStream):
         index = start
         try:
             with open_input(self.path, "driver") as container:
-                stream = cast(av.VideoStream, find_pictures(container))
+                stream = find_pictures(container, f"driver {self.path}")
                 stream.codec_context.thread_count = 1  # chunks are read in parallel already
                 wanted = self._timestamps[start:stop]
                 container.seek(wanted[0], stream=stream, backward=True)
@@ -104,7 +101,7 @@ def _decode_intact(container: InputContainer, stream: av.VideoStream) -> Iterato
         with av.logging.Capture() as complaints:
             frame = next(frames, None)
         if complaints:
-            raise _DamagedError(complaints[0][2].strip())
+            raise _DamagedError(" ".join(complaints[0][2].split()))
         if frame is None:
             return
         yield frame

@@ -191,9 +191,6 @@ def _opened(
     """
     try:
         with open_input(path) as container:
-            stream = find_pictures(container)
-            if stream is None:
-                raise InputError(f"video {path} has no pictures in it that FFmpeg can decode")
-            yield container, stream
+            yield container, find_pictures(container, f"video {path}")
     except FFmpegError as error:
         raise InputError(explain(error.strerror)) from error
