@@ -10,9 +10,6 @@ those of MediaPipe's graphs `pose_detection_cpu` and `pose_landmark_by_roi_cpu` 
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,6 +22,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
 from motion_transfer.extras import require_extra
+from motion_transfer.media.quiet import quiet_libraries
 
 DETECTOR_SIZE = 224
 STRIDES = (8, 16, 32, 32, 32)
@@ -50,7 +48,7 @@ class LiteModel:
         from ai_edge_litert.interpreter import Interpreter
 
         try:
-            with _quiet():
+            with quiet_libraries():  # the run-time remarks on its kernels
                 self._interpreter = Interpreter(model_path=str(path), num_threads=threads)
                 self._interpreter.allocate_tensors()
         except (ValueError, RuntimeError) as error:
@@ -66,19 +64,6 @@ class LiteModel:
         self._interpreter.set_tensor(self._input, image[None])
         self._interpreter.invoke()
         return [self._interpreter.get_tensor(output["index"])[0] for output in self._outputs]
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep the run-time's remark about its kernels, which native code writes, off stderr."""
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
 
 
 @dataclass(frozen=True)

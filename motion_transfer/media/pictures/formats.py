@@ -41,6 +41,7 @@ PHOTO_FORMATS = [
     PictureFormat("BMP", (".bmp",), PHOTOS),
     PictureFormat("TIFF", (".tif", ".tiff"), SEVERAL),
     PictureFormat("AVIF", (".avif",), SEVERAL),
+    PictureFormat("HEIC", (".heic", ".heif", ".hif"), PHOTOS),  # with the extra `heic`
 ]
 """Formats of photos; the first picture is the photo where a file holds several."""
 

@@ -1,36 +1,79 @@
-"""Single pictures: photos read upright, and pictures written or encoded."""
+"""Single pictures: photos read upright and in sRGB, and pictures written or encoded."""
 
 from __future__ import annotations
 
 import io
+import logging
 import warnings
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import cv2
 import numpy as np
 from jaxtyping import UInt8
-from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
+from PIL import ExifTags, Image, UnidentifiedImageError
 
 from motion_transfer.errors import InputError
+from motion_transfer.extras import require_extra
 from motion_transfer.media.files import read_bytes
+from motion_transfer.media.pictures.colours import ProfileError, convert_lab, convert_to_srgb
+from motion_transfer.media.pictures.png import find_png_fault
+from motion_transfer.media.quiet import quiet_libraries
+
+# Pillow logs what it raises, too
+logging.getLogger("PIL").addHandler(logging.NullHandler())
+
+HEIF_BRANDS = set(b"heic heix heim heis hevc hevx hevm hevs mif1 msf1".split())
+AVIF_BRANDS = {b"avif", b"avis"}
+"""What the first box of a file calls itself; AVIF goes by `mif1`, too."""
+
+NO_PHOTOS = {"EPS", "WMF", "BUFR", "GRIB", "HDF5", "MPEG"}
+"""Formats that Pillow tells, and cannot read; EPS is a program, which it would have run."""
+
+TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+"""What turns a picture upright, by EXIF's orientation; 1 is upright, and some cameras write 0."""
+
+UNSIGNED_16 = ("PNG", "PPM")
+"""Formats whose pictures of mode `I` are of 16 bits, which some of Pillow's versions widen."""
+
+# Tags of TIFF, and values of theirs, where Pillow gives numbers as they stand in the file.
+BITS_PER_SAMPLE = 258
+PHOTOMETRIC, WHITE_IS_ZERO = 262, 0
+PLANAR_CONFIGURATION, PLANAR = 284, 2
+SAMPLE_FORMAT, UNSIGNED, UNDEFINED = 339, 1, 4
+
+NO_WHITE = ", and nothing says which one is white; save it with 8 or 16 bits a channel"
 
 
 @dataclass(frozen=True)
 class Photo:
-    """An upright picture.
+    """An upright picture in sRGB.
 
     Attributes:
         rgb: The colours, not multiplied by alpha.
         alpha: The opacity where the file has one, else None.
         turned: Whether the file's EXIF orientation had to be applied.
+        profile: The name of the ICC profile that the colours were converted from, if they were.
+        notes: What the user should know of how the file is read, in sentences.
     """
 
     path: Path
     rgb: UInt8[np.ndarray, "H W 3"]
     alpha: UInt8[np.ndarray, "H W"] | None
     turned: bool
+    profile: str | None = None
+    notes: tuple[str, ...] = ()
 
     def on_white(self) -> UInt8[np.ndarray, "H W 3"]:
         """Lay the picture on paper: where it is transparent, white shows."""
@@ -41,40 +84,150 @@ class Photo:
         return ((self.rgb * weight + 255 * (255 - weight) + 127) // 255).astype(np.uint8)
 
 
-def allow_large() -> AbstractContextManager[object]:
-    """Let Pillow read up to twice its limit without a warning: that is a large picture, no attack.
-
-    Beyond that it raises `DecompressionBombError` all the same.
-    """
-    return warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning)
-
-
 def read_photo(path: Path, what: str = "source") -> Photo:
-    """Read a picture of any common format, turned upright as its EXIF data says.
+    """Read a picture of any common format, turned upright as its EXIF data says, in sRGB.
 
-    Raises: InputError if it is missing, unreadable, truncated or not a picture.
+    Raises: InputError if it is missing, unreadable, truncated, not a picture, or has numbers
+        without a fixed white.
     """
     data = read_bytes(path, what)
+    where = f"{what} {path}"
+    with explain_damage(where), open_image(io.BytesIO(data), where) as file:
+        if fault := find_png_fault(data):
+            raise InputError(f"{where} is {fault}; save it again")
+        return decode_photo(file, path, where)
+
+
+@contextmanager
+def explain_damage(where: str) -> Iterator[None]:
+    """Say which picture could not be decoded, whatever went wrong, and keep warnings back.
+
+    Pillow warns of large pictures, too: up to twice its limit they are no attack, and beyond that
+    it raises `DecompressionBombError` all the same.
+    Raises: InputError.
+    """
     try:
-        with allow_large(), Image.open(io.BytesIO(data)) as file:
-            # 1 is upright, and some cameras write 0, which means nothing
-            turned = file.getexif().get(ExifTags.Base.Orientation, 1) not in (0, 1)
-            # copies of large photos add up: only where something changes
-            image = ImageOps.exif_transpose(file) if turned else file
-            if image.mode.startswith("I"):  # 16-bit grey; convert() would clip, not scale
-                grey = np.asarray(image).astype(np.uint32) >> 8
-                image = Image.fromarray(grey.astype(np.uint8))
-            transparent = "A" in image.mode or "transparency" in image.info
-            mode = "RGBA" if transparent else "RGB"
-            pixels = np.array(image if image.mode == mode else image.convert(mode))
+        with warnings.catch_warnings(action="ignore"):
+            yield
+    except InputError:
+        raise
     except UnidentifiedImageError:
-        raise InputError(f"{what} {path} is not a picture in a known format") from None
+        raise InputError(
+            f"{where} is not a picture in a known format; save it as PNG or JPEG, with 8 bits a"
+            " channel"
+        ) from None
     except Image.DecompressionBombError as error:
-        raise InputError(f"{what} {path} is too large: {error}; scale it down first") from error
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"{what} {path} is damaged: {error}; save it again") from error
-    alpha = pixels[..., 3].copy() if transparent else None
-    return Photo(path=path, rgb=np.ascontiguousarray(pixels[..., :3]), alpha=alpha, turned=turned)
+        raise InputError(f"{where} is too large: {error}; scale it down first") from error
+    except Exception as error:  # each of Pillow's plugins raises what its parser happens to meet
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{where} is damaged: {reason}; save it again") from error
+
+
+def open_image(file: BinaryIO, where: str) -> Image.Image:
+    """Open a picture of any format that is read here.
+
+    Raises: InputError for HEIC where its package is missing, and what Pillow raises.
+    """
+    head = file.read(256)
+    file.seek(0)
+    if _is_heif(head):
+        try:
+            require_extra("heic")
+        except InputError as error:
+            raise InputError(f"{where} is HEIC, and {error}, or save it as JPEG") from None
+        from pillow_heif import register_heif_opener
+
+        register_heif_opener()
+        try:
+            return Image.open(file, formats=["HEIF"])
+        except UnidentifiedImageError:
+            raise OSError("it begins as HEIC, and does not go on so") from None
+    image = Image.open(file)
+    if image.format in NO_PHOTOS:
+        raise UnidentifiedImageError
+    return image
+
+
+def decode_photo(file: Image.Image, path: Path, where: str) -> Photo:
+    """Decode the current picture of an open file.
+
+    Raises: InputError if its numbers have no fixed white, and what Pillow raises.
+    """
+    _check_numbers(file, where)
+    notes: list[str] = []
+    turned = _orientation(file) in TURNS
+    with quiet_libraries() if file.format == "TIFF" else nullcontext():
+        file.load()  # turns a TIFF, and then says that it is upright
+    orientation = _orientation(file)
+    if orientation is None:
+        notes.append(f"the EXIF data of {path} are damaged; the picture is taken as upright")
+    image = _with_8_bits(file)
+    if turn := TURNS.get(orientation):
+        image = image.transpose(turn)
+    alpha = image.convert("RGBA").getchannel("A") if image.has_transparency_data else None
+    name: str | None = None
+    if image.mode == "LAB":
+        image = convert_lab(image)
+    elif profile := file.info.get("icc_profile"):
+        try:
+            image, name = convert_to_srgb(image, profile)
+        except ProfileError as error:
+            notes.append(
+                f"the colour profile of {path} cannot be used ({error}); its colours are taken as"
+                " sRGB"
+            )
+    # copies of large photos add up: only where something changes
+    rgb = np.array(image if image.mode == "RGB" else image.convert("RGB"))
+    return Photo(path, rgb, None if alpha is None else np.array(alpha), turned, name, tuple(notes))
+
+
+def _is_heif(head: bytes) -> bool:
+    """Tell whether a file's first box is HEIC's, whatever the file is called: phones write JPEG."""
+    if head[4:8] != b"ftyp":
+        return False
+    end = int.from_bytes(head[:4], "big")
+    brands = {head[8:12], *(head[at : at + 4] for at in range(16, min(end, len(head)), 4))}
+    return bool(brands & HEIF_BRANDS) and not brands & AVIF_BRANDS
+
+
+def _orientation(file: Image.Image) -> int | None:
+    """Read EXIF's orientation; None where the EXIF data cannot be read."""
+    try:
+        return file.getexif().get(ExifTags.Base.Orientation, 1)
+    except Exception:  # as above
+        return None
+
+
+def _check_numbers(file: Image.Image, where: str) -> None:
+    """Refuse what Pillow would clip or take for something else. Raises: InputError."""
+    tags = getattr(file, "tag_v2", {})
+    if file.mode == "F":
+        raise InputError(f"{where} holds floating-point numbers{NO_WHITE}")
+    signed = not {UNSIGNED, UNDEFINED}.issuperset(tags.get(SAMPLE_FORMAT, (UNSIGNED,)))
+    if signed or (file.mode == "I" and file.format not in UNSIGNED_16):
+        raise InputError(f"{where} holds whole numbers of 32 bits, or with a sign{NO_WHITE}")
+    if (
+        tags.get(PLANAR_CONFIGURATION) == PLANAR
+        and max(tags.get(BITS_PER_SAMPLE, (8,))) > 8
+        and file.info.get("compression") == "raw"
+    ):
+        raise InputError(
+            f"{where} holds a plane of 16 bits for each channel; save it with 8 bits a channel"
+        )
+
+
+def _with_8_bits(file: Image.Image) -> Image.Image:
+    """Scale greys of 16 bits to 8, which Pillow would clip."""
+    if not file.mode.startswith("I"):
+        return file
+    values = np.asarray(file)
+    tags = getattr(file, "tag_v2", {})
+    bits = tags.get(BITS_PER_SAMPLE, (16,))[0]
+    greys = (values >> (bits - 8)).astype(np.uint8)
+    image = Image.fromarray(255 - greys if tags.get(PHOTOMETRIC) == WHITE_IS_ZERO else greys)
+    if (clear := file.info.get("transparency")) is not None:
+        image.putalpha(Image.fromarray(np.where(values == clear, 0, 255).astype(np.uint8)))
+    return image
 
 
 def write_png(path: Path, pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W"]) -> None:

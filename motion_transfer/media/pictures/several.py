@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
-from typing import cast
 
-import imageio.v3 as iio
-import numpy as np
-from imageio.plugins.pillow import PillowPlugin
+from PIL import Image
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.pictures.photo import Photo, allow_large
+from motion_transfer.media.files import read_bytes
+from motion_transfer.media.pictures.photo import Photo, decode_photo, explain_damage, open_image
+from motion_transfer.media.pictures.png import find_png_fault
 from motion_transfer.media.pictures.stream import (
     LARGEST_DENOMINATOR,
     Frame,
@@ -25,11 +24,12 @@ from motion_transfer.media.pictures.stream import (
     show_steadily,
 )
 
-REDUCED = 1
-"""The bit in a TIFF page's type that marks a smaller copy of another page, such as a thumbnail."""
+SUBFILE_TYPE, REDUCED = 254, 1
+"""The tag of a TIFF page's type, and its bit that marks a smaller copy of another page, such as a
+thumbnail."""
 
-UNREADABLE = (OSError, SyntaxError, ValueError, EOFError)
-"""What Pillow raises for damaged files of one format or another."""
+PHOTOS_WITH_MORE = ("MPO", "HEIF")
+"""Formats of phones, whose files may hold depth or a burst as well, whatever the file is called."""
 
 
 def open_several(path: Path) -> PictureStream:
@@ -37,13 +37,7 @@ def open_several(path: Path) -> PictureStream:
 
     Raises: InputError if it cannot be read.
     """
-    try:
-        with _opened(path) as file:
-            # reads headers only; `...` stands for all pictures, which the types leave out
-            count = file.properties(index=...).n_images or 1  # pyright: ignore[reportArgumentType]
-    except UNREADABLE:
-        count = 1  # whoever reads photos says what is wrong
-    clip = AnimatedPicture(path, count) if count > 1 else None
+    clip = AnimatedPicture(path, count) if (count := _count(path)) > 1 else None
     return clip if clip and clip.frame_count > 1 else PhotoStream(path)
 
 
@@ -56,9 +50,13 @@ class AnimatedPicture(PictureStream):
     def __init__(self, path: Path, count: int) -> None:
         """Raises: InputError naming the picture that is broken."""
         self._count = count
-        sizes, durations = zip(
-            *((picture.shape[:2], shown) for picture, shown in self._decode(path)), strict=True
-        )
+        sizes: list[tuple[int, ...]] = []
+        durations: list[Fraction] = []
+        notes: list[str] = []
+        for photo, shown in self._decode(path):
+            sizes.append(photo.rgb.shape[:2])
+            durations.append(shown)
+            notes.extend(photo.notes)
         *self._begins, total = accumulate(durations, initial=Fraction(0))
         self._timing: Timing | None = None
         if total:
@@ -68,53 +66,55 @@ class AnimatedPicture(PictureStream):
         super().__init__(path, self._timing.count if self._timing else len(durations), *sizes[0])
         if self._timing:
             self._take_timing(self._timing)
+        self.notes += tuple(dict.fromkeys(notes))  # all pictures may have the same
 
     def read(self) -> Iterator[Frame]:
         pictures = (
-            self._check_size(picture, number)
-            for number, (picture, _) in enumerate(self._decode(self.path))
+            self._check_size(photo.on_white(), number)
+            for number, (photo, _) in enumerate(self._decode(self.path))
         )
         if self._timing is None:
             return pictures
         return show_steadily(zip(self._begins, pictures, strict=True), self._timing)
 
-    def _decode(self, path: Path) -> Iterator[tuple[Frame, Fraction]]:
+    def _decode(self, path: Path) -> Iterator[tuple[Photo, Fraction]]:
         """Decode every picture, each with how long it is shown, in seconds; 0 for a page."""
-        with _opened(path) as file:
+        with path.open("rb") as opened:
+            with explain_damage(str(path)):
+                file = open_image(opened, str(path))
             for number in range(self._count):
-                try:
-                    shown = _read_upright(file, number, path)
-                except UNREADABLE as error:
-                    raise InputError(
-                        f"picture {number} of {path} is damaged: {error}; save it again"
-                    ) from error
-                if shown:
-                    yield shown
+                where = f"picture {number} of {path}"
+                with explain_damage(where):
+                    decoded = _decode_part(file, number, path, where)
+                if decoded:
+                    yield decoded
 
 
-def _read_upright(file: PillowPlugin, number: int, path: Path) -> tuple[Frame, Fraction] | None:
-    """Read one picture, upright and on white, and how long it is shown; None if it is no part."""
-    facts = file.metadata(index=number)
+def _count(path: Path) -> int:
+    """Count the pictures of a file by its headers; 1 if it is for readers of photos."""
+    data = read_bytes(path, "picture")
+    if fault := find_png_fault(data):
+        raise InputError(f"picture {path} is {fault}; save it again")
+    try:
+        with explain_damage(str(path)), open_image(io.BytesIO(data), str(path)) as file:
+            return 1 if file.format in PHOTOS_WITH_MORE else getattr(file, "n_frames", 1)
+    except InputError:
+        return 1  # whoever reads photos says what is wrong
+
+
+def _decode_part(
+    file: Image.Image, number: int, path: Path, where: str
+) -> tuple[Photo, Fraction] | None:
+    """Decode one picture, and tell how long it is shown; None if it is no part of the clip."""
+    file.seek(number)
     # an APNG may begin with a still for programs that cannot play it
-    if facts.get("NewSubfileType", 0) & REDUCED if number else facts.get("default_image"):
+    if getattr(file, "tag_v2", {}).get(SUBFILE_TYPE, 0) & REDUCED if number else _is_still(file):
         return None
-    transparent = "A" in facts["mode"] or "transparency" in facts
-    with allow_large():
-        if facts["mode"].startswith("I"):  # 16-bit grey; converting it would clip, not scale
-            grey = (file.read(index=number, rotate=True).astype(np.uint32) >> 8).astype(np.uint8)
-            pixels = np.dstack([grey] * 3)
-        else:
-            pixels = file.read(index=number, mode="RGBA" if transparent else "RGB", rotate=True)
-    alpha = pixels[..., 3] if transparent else None
-    photo = Photo(path, np.ascontiguousarray(pixels[..., :3]), alpha, turned=False)
-    # asked for once more: WebP and AVIF tell a picture's duration when it has been decoded
-    milliseconds = Fraction(file.metadata(index=number).get("duration") or 0)
-    return photo.on_white(), milliseconds.limit_denominator(LARGEST_DENOMINATOR) / 1000
+    photo = decode_photo(file, path, where)
+    # only now: WebP and AVIF tell a picture's duration when it has been decoded
+    milliseconds = Fraction(file.info.get("duration") or 0)
+    return photo, milliseconds.limit_denominator(LARGEST_DENOMINATOR) / 1000
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[PillowPlugin]:
-    with allow_large():
-        file = iio.imopen(path, "r", plugin="pillow")
-    with file:
-        yield cast(PillowPlugin, file)
+def _is_still(file: Image.Image) -> bool:
+    return bool(file.info.get("default_image"))

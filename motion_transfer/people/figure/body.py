@@ -24,6 +24,7 @@ from jaxtyping import Float32, Float64, Int32
 from scipy.sparse import csr_array
 
 from motion_transfer.extras import require_extra
+from motion_transfer.media.quiet import quiet_libraries
 
 SHAPE_RANK = 120
 """Directions in which bodies vary, of 310. Measured over 60 random adults, no vertex is more than
@@ -240,15 +241,8 @@ def start_warp() -> None:
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
-    # the remark comes from native code: only the file descriptor can be kept from it
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
+    with quiet_libraries():
         warp.init()
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
 
 
 @contextmanager
