@@ -9,7 +9,7 @@ ifneq ($(wildcard ../shared/data),)
 export MT_SAMPLES ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo test lint check schema lock clean
+.PHONY: demo test fuzz lint check schema lock clean
 
 demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion, then one without IUV
 	$(BIN)/mt demo --output demo.mp4 --force
@@ -18,6 +18,11 @@ demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion, t
 
 test: $(VENV)/.installed-dev  ## run the tests
 	$(BIN)/python -m pytest --numprocesses auto
+
+FUZZ_SECONDS ?= 600
+
+fuzz: $(VENV)/.installed-dev  ## hostile files, so many seconds a format; what is found is kept in fuzz_found
+	cd tests && OMP_NUM_THREADS=1 ../$(BIN)/python -m fuzz --seconds $(FUZZ_SECONDS) --keep ../fuzz_found
 
 lint: $(VENV)/.installed-dev  ## style, types, and the direction of imports
 	$(BIN)/ruff check .
