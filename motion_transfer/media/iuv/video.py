@@ -12,7 +12,6 @@ from pathlib import Path
 
 import av
 import av.logging
-import cv2
 from av.container import InputContainer
 from av.error import FFmpegError
 
@@ -20,15 +19,18 @@ from motion_transfer.errors import IuvFileError
 from motion_transfer.media.container import find_pictures, open_input
 from motion_transfer.media.iuv.lookalikes import explain_picture
 from motion_transfer.media.iuv.stream import IuvStream, Raw
-from motion_transfer.media.pictures.display import describe_pixels, find_pixel_ratio, square_size
+from motion_transfer.media.pictures.display import (
+    describe_pixels,
+    find_pixel_ratio,
+    square_size,
+    stretch_whole,
+)
 from motion_transfer.media.pictures.video import pick_frames
 
 LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
 LOSSLESS_REMEDY = (
     "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt bgr0 out.mkv`"
 )
-
-NEAREST = cv2.INTER_NEAREST_EXACT  # the other one is shifted by half a pixel
 
 
 class VideoStream(IuvStream):
@@ -76,10 +78,7 @@ class VideoStream(IuvStream):
                 container.seek(wanted[0], stream=stream, backward=True)
                 for frame in pick_frames(_decode_intact(container, stream), wanted):
                     size = square_size(frame.width, frame.height, self._pixel_ratio)
-                    raw = frame.to_ndarray(format="rgb24")
-                    # parts have no values between them
-                    stretched = size != (frame.width, frame.height)
-                    yield cv2.resize(raw, size, interpolation=NEAREST) if stretched else raw
+                    yield stretch_whole(frame.to_ndarray(format="rgb24"), size)
                     index += 1
         except (FFmpegError, _DamagedError) as error:
             reason = error.strerror if isinstance(error, FFmpegError) else error

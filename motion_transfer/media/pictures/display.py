@@ -8,7 +8,11 @@ from pathlib import Path
 from typing import cast
 
 import av
+import numpy as np
 from av.filter import Graph
+from jaxtyping import UInt8
+
+Image = UInt8[np.ndarray, "H W 3"]
 
 LARGEST_RATIO = 4
 """Of a pixel's sides. Anamorphic films reach 2, video discs 3; headers that are wrong say more."""
@@ -34,6 +38,19 @@ def square_size(width: int, height: int, pixel_ratio: Fraction) -> tuple[int, in
         grown[0] if grown[0] > width + 1 else width,
         grown[1] if grown[1] > height + 1 else height,
     )
+
+
+def stretch_whole(image: Image, size: tuple[int, int]) -> Image:
+    """Stretch to (width, height) by repeating pixels: what has no values between its values.
+
+    OpenCV would do it, but rounds halves up in some rows and down in others.
+    """
+    height, width = image.shape[:2]
+    if size == (width, height):
+        return image
+    columns = (2 * np.arange(size[0]) + 1) * width // (2 * size[0])
+    rows = (2 * np.arange(size[1]) + 1) * height // (2 * size[1])
+    return image[rows[:, None], columns]
 
 
 def describe_pixels(path: Path, stream: av.VideoStream) -> tuple[str, ...]:
