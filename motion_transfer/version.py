@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 __version__ = "0.1.0"
 
 MODULES = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL"}
@@ -16,9 +18,12 @@ def package_version(name: str) -> str:
     """
     from importlib.metadata import PackageNotFoundError, packages_distributions, version
 
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        for other in packages_distributions().get(MODULES.get(name, name), []):
-            return version(other)
+    # a broken installation has no version, or no metadata at all
+    with suppress(PackageNotFoundError, KeyError):
+        if found := version(name):
+            return found
+    for other in packages_distributions().get(MODULES.get(name, name), []):
+        with suppress(PackageNotFoundError, KeyError, ValueError, TypeError):  # or no name
+            if found := version(other):
+                return found
     return "unknown"

@@ -82,9 +82,10 @@ class ModelConfig:
             ("down_blocks", 1, 6, 1),
             ("residual_blocks", 1, 64, 1),
             ("texture_size", 16, 4096, 16),
-            ("image_size", 16, 4096, 2**self.down_blocks),
+            ("image_size", 16, 4096, 0),
         ):
             value = getattr(self, name)
+            multiple = multiple or 2**self.down_blocks  # which was checked by then
             if type(value) is not int or not low <= value <= high or value % multiple:
                 rule = f"an integer from {low} to {high}"
                 rule += f", a multiple of {multiple}" if multiple > 1 else ""

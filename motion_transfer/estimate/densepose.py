@@ -29,9 +29,12 @@ from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.estimate.interface import PersonEstimate, check_frame
 from motion_transfer.estimate.models import digest
+from motion_transfer.media.files import read_bytes
+from motion_transfer.weights.tensors import check_weights
 from nhrr_core.iuv import PART_COUNT
 
 LOWEST_SCORE = 0.8  # detectron2's own default where it draws people
+FARTHEST = 4  # longer sides of a picture that a box may reach away from its corner
 SAME_PERSON_OVERLAP = 0.3  # with a box of the frame before; less is somebody else
 
 OUTPUTS = {
@@ -61,8 +64,7 @@ class DensePoseEstimator:
     def __init__(self, model: Path, *, lowest_score: float = LOWEST_SCORE) -> None:
         if not 0 <= lowest_score <= 1:
             raise InputError(f"lowest score {lowest_score}; it lies between 0 and 1")
-        if not model.is_file():
-            raise WeightsError(f"DensePose model {model} does not exist")
+        check_weights(model, "DensePose model")
         self._path = model
         self._lowest_score = lowest_score
         self._predict = (_open_onnx if model.suffix.lower() == ".onnx" else _open_script)(model)
@@ -84,12 +86,14 @@ class DensePoseEstimator:
         check_frame(frame)
         try:
             outputs = self._predict(np.ascontiguousarray(frame[..., ::-1]))
-        except (RuntimeError, ValueError, TypeError) as error:
+        except Exception as error:  # whatever its code does
+            # TorchScript's messages end with the reason, after a traceback
+            reason = (str(error).strip().splitlines() or [repr(error)])[-1]
             raise WeightsError(
                 f"DensePose model {self._path} fails on {frame.shape[1]} x {frame.shape[0]}:"
-                f" {str(error).strip().splitlines()[-1]}"
+                f" {reason}"
             ) from error
-        self._check(outputs)
+        self._check(outputs, max(frame.shape[:2]))
         people, seen = [], []
         for index in outputs["scores"].argsort(descending=True, stable=True).tolist():
             score = float(outputs["scores"][index])
@@ -113,13 +117,14 @@ class DensePoseEstimator:
         self._tracks += 1
         return self._tracks - 1
 
-    def _check(self, outputs: Any) -> None:
+    def _check(self, outputs: Any, side: int) -> None:
+        """Raise WeightsError for what is not promised; `side` is the picture's longer one, px."""
         if missing := [name for name in OUTPUTS if name not in outputs]:
             raise WeightsError(
                 f"DensePose model {self._path} gives no {', '.join(missing)}; export a chart-based"
                 " (IUV) model with DensePose-TorchScript"
             )
-        people = len(outputs["scores"])
+        people = outputs["scores"].numel()
         for name, (dimensions, channels) in OUTPUTS.items():
             shape = list(outputs[name].shape)
             wrong = len(shape) != dimensions or shape[0] != people
@@ -128,14 +133,18 @@ class DensePoseEstimator:
                     f"DensePose model {self._path} gives {name} as {shape} for {people} people"
                     + (f"; N x {channels} x h x w is expected" if channels else "")
                 )
+        # what is painted is as large as its box; NaN is no less and no more than anything
+        if not (outputs["pred_boxes"].abs() <= FARTHEST * side).all():
+            raise WeightsError(
+                f"DensePose model {self._path} gives boxes that lie far outside of the picture"
+            )
+        if outputs["scores"].isnan().any():
+            raise WeightsError(f"DensePose model {self._path} gives scores that are no numbers")
 
 
 def model_facts(model: Path) -> dict[str, Any]:
     """Tell what decides the answers, for keys of content: the file. Raises: InputError."""
-    try:
-        return {"model": digest(model.read_bytes())}
-    except OSError as error:
-        raise InputError(f"DensePose model {model} cannot be read: {error.strerror}") from error
+    return {"model": digest(read_bytes(model, "DensePose model"))}
 
 
 def _open_script(path: Path) -> Callable[[Picture], Outputs]:
@@ -145,13 +154,16 @@ def _open_script(path: Path) -> Callable[[Picture], Outputs]:
     device = "cuda" if torch.cuda.is_available() else "cpu"
     try:
         module = torch.jit.load(str(path), map_location=device).eval()
-    except (RuntimeError, ValueError, OSError) as error:
+    except Exception as error:  # of a damaged file they have no common base
         if "torchvision::" in str(error):
             raise WeightsError(
                 f"DensePose model {path} uses operators of torchvision, which is not installed:"
                 " pip install torchvision, in the version that fits torch"
             ) from error
-        raise WeightsError(f"DensePose model {path} is not a TorchScript file") from error
+        raise WeightsError(
+            f"DensePose model {path} is not a whole TorchScript file; export it with"
+            " DensePose-TorchScript, or end its name in .onnx if it is that"
+        ) from error
     if device == "cpu":
         module = module.float()  # half precision is for GPUs
 
@@ -175,9 +187,9 @@ def _open_onnx(path: Path) -> Callable[[Picture], Outputs]:
         ) from None
     try:
         session = runtime.InferenceSession(str(path), providers=runtime.get_available_providers())
+        (entry, *_), names = session.get_inputs(), [out.name for out in session.get_outputs()]
     except Exception as error:  # its errors have no common base
         raise WeightsError(f"DensePose model {path} is not a readable ONNX file") from error
-    (entry, *_), names = session.get_inputs(), [output.name for output in session.get_outputs()]
     # conversions differ in the picture's type and in where its channels lie
     kind = np.uint8 if entry.type == "tensor(uint8)" else np.float32
     channels_first = list(entry.shape)[:1] == [3]

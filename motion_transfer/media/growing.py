@@ -16,8 +16,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from motion_transfer.errors import OutputError
+from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.publish import publish
+from motion_transfer.media.structured import parse_json, read_text, shown
 
 MakeItem = Callable[[int], object]
 """Makes the item of a number, whole or not at all."""
@@ -41,9 +42,11 @@ def claim_folder(settings_file: Path, settings: Mapping[str, Any], items: str) -
     if not settings_file.exists():
         raise OutputError(f"{folder} holds other things than {items}; choose another folder")
     try:
-        found = json.loads(settings_file.read_text())
-    except ValueError as error:
-        raise OutputError(f"{settings_file} is damaged ({error}); choose another folder") from error
+        found = parse_json(read_text(settings_file, "settings"), str(settings_file))
+        if not isinstance(found, dict):
+            raise InputError(f"{settings_file}: {shown(found)} is no table of settings")
+    except InputError as error:
+        raise OutputError(f"{error}; choose another folder") from error
     other = [name for name, value in settings.items() if found.get(name) != value]
     if other:
         told = ", ".join(f"{name} {found.get(name)}" for name in other)

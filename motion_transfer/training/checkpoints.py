@@ -12,7 +12,6 @@ Each model says in its notes what it was trained on, how, and under which licenc
 from __future__ import annotations
 
 import json
-import pickle
 import re
 import shutil
 from collections.abc import Mapping
@@ -25,10 +24,12 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import nn
 
-from motion_transfer.errors import InputError
+from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.media.publish import publish, work_folder
+from motion_transfer.media.structured import read_structured
 from motion_transfer.training.config import KeepingSettings
 from motion_transfer.weights.checkpoint import load_checkpoint, save_checkpoint
+from motion_transfer.weights.tensors import first_line, load_pickled
 from nhrr_core import NeuralReRenderer
 
 STATE = "state.json"
@@ -102,9 +103,9 @@ def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> No
     Raises: InputError or WeightsError if it is damaged or belongs to other data.
     """
     folder = checkpoint_folder(run, step)
-    damages = (OSError, KeyError, ValueError, RuntimeError, SafetensorError)
+    damages = (OSError, KeyError, TypeError, ValueError, RuntimeError, SafetensorError)
     try:
-        content = json.loads((folder / STATE).read_text())
+        content = read_structured(folder / STATE, "state").data
         if content["data"] != data_digest:
             raise InputError(
                 f"checkpoint {folder} was trained on other pairs than the data has now; put the"
@@ -115,17 +116,17 @@ def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> No
             model.load_state_dict(kept.state_dict())
         if state.discriminator is not None:
             state.discriminator.load_state_dict(load_file(folder / "discriminator.safetensors"))
-        optimisers = torch.load(folder / "optimisers.pt", map_location="cpu", weights_only=True)
+        optimisers = load_pickled(folder / "optimisers.pt", "optimisers")
         for name, optimiser in state.optimisers.items():
             optimiser.load_state_dict(optimisers[name])
-        random = torch.load(folder / "random.pt", weights_only=True)
+        random = load_pickled(folder / "random.pt", "random state")
         torch.set_rng_state(random["cpu"])
         if "cuda" in random and torch.cuda.is_available():
             torch.cuda.set_rng_state(random["cuda"])
-    except (*damages, pickle.UnpicklingError) as error:
+    except (*damages, WeightsError) as error:
         raise InputError(
-            f"checkpoint {folder} is damaged ({error}); remove the folder to go on from the one"
-            " before"
+            f"checkpoint {folder} is damaged ({first_line(error)}); remove the folder to go on from"
+            " the one before"
         ) from error
 
 

@@ -7,7 +7,6 @@ EfficientNet-Lite0 come as a package.
 from __future__ import annotations
 
 import math
-import pickle
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -22,7 +21,7 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from motion_transfer.errors import InputError, WeightsError
-from motion_transfer.weights.checkpoint import list_misfits
+from motion_transfer.weights.tensors import check_weights, list_misfits, load_pickled
 
 EPSILON = 1e-3  # of TensorFlow's batch norm in this network
 CLASSES = 1000
@@ -88,14 +87,13 @@ def read_tensors(path: Path, *, what: str, remedy: str) -> dict[str, Tensor]:
 
     Nothing but tensors is unpickled. Raises: WeightsError.
     """
-    if not path.is_file():
-        raise WeightsError(f"{what}: {path} does not exist; {remedy}")
-    broken = (SafetensorError, OSError, RuntimeError, EOFError, ValueError, KeyError)
     try:
-        if path.suffix == ".safetensors":
-            return load_file(path)
-        state = torch.load(path, map_location="cpu", weights_only=True)
-    except (*broken, pickle.UnpicklingError) as error:
+        check_weights(path, what)
+    except WeightsError as error:
+        raise WeightsError(f"{error}; {remedy}") from None
+    try:
+        state = load_file(path) if path.suffix == ".safetensors" else load_pickled(path, what)
+    except (SafetensorError, OSError, WeightsError) as error:
         raise WeightsError(
             f"{what}: {path} is neither a whole .safetensors file nor tensors saved by torch;"
             f" {remedy}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from importlib.metadata import version
 from pathlib import Path
 
 from motion_transfer.errors import InputError
@@ -31,7 +30,7 @@ from motion_transfer.training.pairs import (
     open_pairs,
 )
 from motion_transfer.training.pictures import PersonPicture, PhotoFile
-from motion_transfer.version import __version__
+from motion_transfer.version import __version__, package_version
 
 NOT_PHOTOS = (*IUV_ENDINGS, "_alpha")
 SOURCES_EACH = 4
@@ -168,7 +167,7 @@ def held_out_pairs(count: int) -> PairList:
     Raises: InputError without the extra.
     """
     people = StreamedPairs(seed=HELD_OUT_SEED, size=HELD_OUT_SIZE, noise=0.0, split="held-out")
-    made_of = [HELD_OUT_SEED, HELD_OUT_SIZE, count, __version__, *map(version, DRAWN_BY)]
+    made_of = [HELD_OUT_SEED, HELD_OUT_SIZE, count, __version__, *map(package_version, DRAWN_BY)]
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
     return PairList("people (held-out)", [people[number] for number in range(count)], digest)
 

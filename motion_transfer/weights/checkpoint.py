@@ -1,8 +1,7 @@
 """Checkpoints: one safetensors file that carries its own configuration.
 
-Reading takes three steps, each of which says what it refuses: from the file to tensors and
-metadata, from metadata to the configuration, and from tensors to the model, all of them and no
-others.
+Reading takes three steps, each of which says what it refuses: from the file to its header, from the
+header to the configuration, and from the tensors to the model, all of them and no others.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
-from torch import Tensor, nn
 
-from motion_transfer.errors import WeightsError
+from motion_transfer.errors import InputError, WeightsError
+from motion_transfer.media.structured import parse_json, shown
 from motion_transfer.media.work import digest_file
+from motion_transfer.weights.tensors import check_weights, load_network, read_header
 from nhrr_core import ConfigError, ModelConfig, NeuralReRenderer
 
 FORMAT = "nhrr-1"
@@ -69,54 +68,24 @@ def load_checkpoint(path: Path) -> NeuralReRenderer:
     Raises: WeightsError if the file is missing, truncated, not a checkpoint of this model, or its
         tensors are not exactly those that its configuration calls for.
     """
-    info, state = _read(path, with_tensors=True)
-    model = NeuralReRenderer(info.config)
-    if listed := list_misfits(model, state):
-        raise WeightsError(f"weights {path} do not fit their own configuration: {listed}")
-    model.load_state_dict(state)
-    return model.eval()
-
-
-def list_misfits(network: nn.Module, state: Mapping[str, Tensor]) -> str:
-    """List up to three things that keep tensors from being exactly those of a network; else ""."""
-    wanted = network.state_dict()
-    problems = [f"{name} is missing" for name in wanted if name not in state]
-    problems += [f"{name} is unknown" for name in state if name not in wanted]
-    problems += [
-        f"{name} is {list(state[name].shape)}, not {list(tensor.shape)}"
-        for name, tensor in wanted.items()
-        if name in state and state[name].shape != tensor.shape
-    ]
-    return "; ".join(problems[:3]) + ("; ..." if len(problems) > 3 else "")
+    header = read_header(path, "weights")
+    config = _read_config(path, header.metadata)
+    return load_network(lambda: NeuralReRenderer(config), header.state, path, "weights").eval()
 
 
 def digest_weights(path: Path) -> str:
     """Compute the SHA-256 of a checkpoint, hexadecimal. Raises: InputError if it cannot be read."""
+    check_weights(path, "weights")
     return digest_file(path, "weights")
 
 
 def inspect_checkpoint(path: Path) -> CheckpointInfo:
     """Tell what a checkpoint holds, without reading its tensors. Raises: WeightsError."""
-    return _read(path, with_tensors=False)[0]
-
-
-def _read(path: Path, *, with_tensors: bool) -> tuple[CheckpointInfo, dict[str, Tensor]]:
-    if not path.is_file():
-        raise WeightsError(f"weights {path} do not exist")
-    try:
-        with safe_open(path, framework="pt") as file:
-            metadata = dict(file.metadata() or {})
-            shapes = {name: file.get_slice(name).get_shape() for name in file.keys()}  # noqa: SIM118
-            state = {name: file.get_tensor(name) for name in shapes} if with_tensors else {}
-    except (SafetensorError, OSError) as error:
-        raise WeightsError(
-            f"weights {path} are not a whole safetensors file ({error}); download or export again"
-        ) from error
-    config = _read_config(path, metadata)
+    metadata, state = read_header(path, "weights")
     # safetensors tells them in an order that changes from run to run
     notes = {key: metadata[key] for key in sorted(metadata) if key not in RESERVED}
-    count = sum(torch.Size(shape).numel() for shape in shapes.values())
-    return CheckpointInfo(path, config, notes, len(shapes), count), state
+    count = sum(tensor.numel() for tensor in state.values())
+    return CheckpointInfo(path, _read_config(path, metadata), notes, len(state), count)
 
 
 def _read_config(path: Path, metadata: dict[str, str]) -> ModelConfig:
@@ -126,6 +95,9 @@ def _read_config(path: Path, metadata: dict[str, str]) -> ModelConfig:
             f" {metadata.get('format')!r}, not {FORMAT!r}"
         )
     try:
-        return ModelConfig.from_dict(json.loads(metadata["config"]))
-    except (KeyError, TypeError, AttributeError, json.JSONDecodeError, ConfigError) as error:
+        values = parse_json(metadata.get("config", "null"), "config")
+        if not isinstance(values, dict):
+            raise ConfigError(f"{shown(values)} is no table of fields")
+        return ModelConfig.from_dict(values)
+    except (ConfigError, InputError) as error:
         raise WeightsError(f"weights {path} carry a broken configuration: {error}") from error

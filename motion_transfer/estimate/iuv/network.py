@@ -16,13 +16,12 @@ from typing import NamedTuple
 
 import torch
 from jaxtyping import Float
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from motion_transfer.errors import WeightsError
+from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.estimate.iuv.features import (
     GRID,
     MAP_CHANNELS,
@@ -31,11 +30,15 @@ from motion_transfer.estimate.iuv.features import (
     feature_maps,
     feature_vector,
 )
+from motion_transfer.media.structured import parse_json
+from motion_transfer.weights.tensors import load_network, read_header
 from nhrr_core.iuv import PART_COUNT
 
 PARTS = PART_COUNT + 1  # and the background
 FINER = 2  # output pixels a cell and side
 OUTPUT_SIZE = GRID * FINER
+MOST_LEVELS = 7  # the last one is a single cell
+WIDEST = 4096
 SHIPPED = "iuv_network.safetensors"
 
 
@@ -50,6 +53,16 @@ class IuvNetworkConfig:
 
     widths: tuple[int, ...] = (32, 56, 96, 144)
     code: int = 128
+
+    def __post_init__(self) -> None:
+        """Raises: ValueError for sizes that no network has."""
+        sizes = (*self.widths, self.code)
+        if not 1 <= len(self.widths) <= MOST_LEVELS or not all(
+            type(size) is int and 1 <= size <= WIDEST for size in sizes
+        ):
+            raise ValueError(
+                f"1 to {MOST_LEVELS} widths and a code from 1 to {WIDEST}, not {sizes[:9]}"
+            )
 
 
 class IuvLogits(NamedTuple):
@@ -168,18 +181,18 @@ def load_weights(path: Path) -> IuvNetwork:
 
     Raises: WeightsError if the file is missing, damaged, or another network's.
     """
+    what = "weights of the IUV network in"
+    header = read_header(path, what)
     try:
-        with safe_open(path, "pt") as stored:
-            config = json.loads((stored.metadata() or {})["config"])
-            config["widths"] = tuple(config["widths"])
-            network = IuvNetwork(IuvNetworkConfig(**config))
-            tensors = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
-        network.load_state_dict(tensors)  # into float32, from the half precision of the file
-    except (OSError, SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        values = parse_json(header.metadata["config"], "config")
+        config = IuvNetworkConfig(widths=tuple(values.pop("widths")), **values)
+    except (InputError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise WeightsError(
             f"{path} holds no weights of the IUV network ({type(error).__name__}: {error});"
             " give a file written by `mt train iuv fit`"
         ) from error
+    # into float32, from the half precision of the file
+    network = load_network(lambda: IuvNetwork(config), header.state, path, what)
     return network.fused().requires_grad_(False)
 
 

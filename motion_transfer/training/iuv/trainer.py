@@ -11,7 +11,6 @@ never stopped would have seen. The learning rate falls as a half cosine over all
 from __future__ import annotations
 
 import math
-import pickle
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -26,7 +25,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motion_transfer.drawing.person import Box
-from motion_transfer.errors import InputError, TrainingError
+from motion_transfer.errors import InputError, TrainingError, WeightsError
 from motion_transfer.estimate.iuv.features import BodyInput, stack_inputs
 from motion_transfer.estimate.iuv.network import (
     OUTPUT_SIZE,
@@ -42,6 +41,7 @@ from motion_transfer.training.iuv.augmentation import NOTHING, Augmentation, tra
 from motion_transfer.training.iuv.samples import list_samples, read_sample
 from motion_transfer.training.progress import Listener, Logged
 from motion_transfer.training.speed import Clock
+from motion_transfer.weights.tensors import first_line, load_pickled
 
 UV_WEIGHT = 5.0  # chosen: an l1 of U and V is small beside a cross-entropy
 SMALL_PARTS = 0.3
@@ -249,14 +249,14 @@ class IuvTraining:
     def _read_state(self) -> None:
         file = self.run / "state.pt"
         try:
-            state = torch.load(file, map_location="cpu", weights_only=True)
+            state = load_pickled(file, "state")
             for name in KEPT:
                 getattr(self, name).load_state_dict(state[name])
             self.step = int(state["step"])
-        except (OSError, KeyError, ValueError, RuntimeError, pickle.UnpicklingError) as error:
+        except (KeyError, TypeError, ValueError, RuntimeError, WeightsError) as error:
             raise InputError(
-                f"{file} is damaged, or of a network of another size ({error}); remove it to begin"
-                " anew"
+                f"{file} is damaged, or of a network of another size ({first_line(error)}); remove"
+                " it to begin anew"
             ) from error
 
 

@@ -241,7 +241,8 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="two results files or more"):
         compare([path])
     for text, reason in (
-        ("words", "is not a results file"),
+        ("words", r"y\.json:1: Expecting value"),
+        ("[" * 50000, r"y\.json:1: lists and mappings lie in each other more"),
         ("[]", "is not a results file"),
         ('{"format": "mt-eval-9"}', "has format 'mt-eval-9', expected 'mt-eval-1'"),
         ('{"format": "mt-eval-1"}', "is not a results file"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,12 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from motion_transfer.errors import WeightsError
-from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint, save_checkpoint
+from motion_transfer.weights.checkpoint import (
+    digest_weights,
+    inspect_checkpoint,
+    load_checkpoint,
+    save_checkpoint,
+)
 from nhrr_core import ModelConfig
 
 
@@ -101,6 +107,22 @@ def spoil(checkpoint: Path, path: Path, kind: str) -> Path:
         metadata["config"] = json.dumps({**config, "depth": 3})
     elif kind == "impossible value":
         metadata["config"] = json.dumps({**config, "image_size": 65})
+    elif kind == "terabytes":
+        metadata["config"] = json.dumps({**config, "render_width": 1024, "down_blocks": 6})
+    elif kind == "blocks without end":
+        metadata["config"] = json.dumps({**config, "down_blocks": 2**62})
+    elif kind == "no number":
+        metadata["config"] = json.dumps({**config, "image_size": float("nan")})
+    elif kind == "digits":
+        metadata["config"] = '{"image_size": ' + "9" * 5000 + "}"
+    elif kind == "deep":
+        metadata["config"] = "[" * 50000
+    elif kind == "twice":
+        metadata["config"] = '{"alpha": true, "alpha": false}'
+    elif kind == "values that are no numbers":
+        state[name] = torch.full_like(tensor, torch.nan)
+    elif kind == "whole numbers":
+        state[name] = torch.zeros_like(tensor, dtype=torch.int32)
     elif kind == "another configuration":
         metadata["config"] = json.dumps({**config, "render_width": 8})
     save_file(state, path, metadata=metadata)
@@ -108,8 +130,8 @@ def spoil(checkpoint: Path, path: Path, kind: str) -> Path:
 
 
 BROKEN = [
-    ("missing", "do not exist"),
-    ("folder", "do not exist|not a whole safetensors"),
+    ("missing", "does not exist"),
+    ("folder", "is a folder; name a file in it"),
     ("empty", "not a whole safetensors file"),
     ("random", "not a whole safetensors file"),
     ("truncated", "not a whole safetensors file"),
@@ -122,11 +144,19 @@ BROKEN = [
     ("configuration is a list", "broken configuration"),
     ("unknown field", "broken configuration: unknown configuration field depth"),
     ("impossible value", "broken configuration: image_size is 65"),
+    ("blocks without end", "broken configuration: config:1: '4611686018427387904' is no number"),
+    ("no number", "broken configuration: config:1: 'NaN' is no number"),
+    ("digits", "broken configuration: config:1: '99999"),
+    ("deep", "broken configuration: config:1: lists and mappings lie in each other"),
+    ("twice", "broken configuration: config:1: alpha stands here, and in line 1, too"),
 ]
 UNFIT = [
     ("tensor missing", "is missing"),
     ("tensor unknown", "stranger is unknown"),
     ("tensor of another shape", r"is \[1, .*\], not \["),
+    ("terabytes", "layers.13.weight is missing"),
+    ("values that are no numbers", "holds values that are no finite numbers"),
+    ("whole numbers", "holds another kind of numbers"),
     ("another configuration", r"is \[.*\], not \[.*; \.\.\."),
 ]
 
@@ -158,3 +188,19 @@ def test_a_model_of_any_variant_survives(tmp_path: Path) -> None:
         )
         save_checkpoint(tmp_path / "a.safetensors", NeuralReRenderer(config))
         assert load_checkpoint(tmp_path / "a.safetensors").config == config
+
+
+def test_pickles_are_told_what_to_do(tmp_path: Path, checkpoint: Path) -> None:
+    path = spoil(checkpoint, tmp_path / "epoch_9.pth", "pickle")
+    with pytest.raises(
+        WeightsError, match=r"epoch_9\.pth .*; only \.safetensors is read; save its"
+    ):
+        load_checkpoint(path)
+
+
+def test_pipes_and_devices_are_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero")):
+        for read_it in (load_checkpoint, inspect_checkpoint, digest_weights):
+            with pytest.raises(WeightsError, match=f"weights {path} is a device or a pipe"):
+                read_it(path)
