@@ -79,8 +79,8 @@ def find_pictures(container: InputContainer, where: str) -> av.VideoStream:
     ]
     decodable = [stream for stream in streams if stream.codec_context is not None]
     if not decodable:
-        reason = "in a codec that is known here" if streams else "in it"
-        raise InputError(f"{where} has no pictures {reason}; export it again, or name another file")
+        reason = "a video in an unknown codec" if streams else "no video and no pictures in it"
+        raise InputError(f"{where} has {reason}; convert it, or name another file")
     return decodable[0]
 
 

@@ -6,7 +6,7 @@ missing, there is silence, and what follows is not moved to the front.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
@@ -116,7 +116,16 @@ def choose_audio(
     except FFmpegError as error:
         raise InputError(f"{what} cannot be read: {error.strerror}; {remedy}") from error
     cut = AudioCut(path, begins if wish else start_seconds, duration_seconds, chosen)
-    if sum(1 for _ in _read_cut(cut)):
+    holes: list[_Hole] = []
+    if sum(1 for _ in _read_cut(cut, holes.append)):
+        if holes:
+            missing = float(sum(hole.seconds for hole in holes))
+            listener(
+                Notice(
+                    f"the sound of {path} has holes, {missing:.2f} s in all, the first one"
+                    f" {float(holes[0].begins_seconds):.2f} s into the output; they are silent"
+                )
+            )
         return cut
     if wish is None and track is None:
         return None
@@ -158,6 +167,14 @@ class _Block:
     samples: Samples
     rate: int
     layout: str
+
+
+@dataclass(frozen=True)
+class _Hole:
+    """Where sound stops, and goes on later."""
+
+    begins_seconds: Fraction
+    seconds: Fraction
 
 
 class AudioTrack:
@@ -226,19 +243,23 @@ class AudioTrack:
         return block
 
 
-def _read_cut(cut: AudioCut) -> Iterator[_Block]:
+def _read_cut(cut: AudioCut, hear_hole: Callable[[_Hole], object] = id) -> Iterator[_Block]:
     """Decode a piece of sound, with silence where there is none, exactly as long as it is to be.
 
     Where sound lies over other sound, the first to come is kept. A track without any sound gives
     nothing, not even silence.
+
+    Args:
+        hear_hole: Hears of every place where sound stops and goes on later.
     Raises: InputError.
     """
     heard: _Block | None = None
     ends: int | None = None  # where the sound so far ends on the file's clock, in samples
-    written = stop = 0  # on the same clock
+    first = written = stop = 0  # on the same clock
+    goes_on = False
     for begins_seconds, block in _decode(cut):
         if heard is None:
-            written = round(cut.start_seconds * block.rate)
+            first = written = round(cut.start_seconds * block.rate)
             stop = written + max(1, round(cut.duration_seconds * block.rate))
         heard = block
         if begins_seconds is not None:
@@ -249,12 +270,16 @@ def _read_cut(cut: AudioCut) -> Iterator[_Block]:
         ends = begins + block.samples.shape[1]
         if begins >= stop:
             break
+        if goes_on and begins > written:
+            hole = Fraction(written - first, block.rate), Fraction(begins - written, block.rate)
+            hear_hole(_Hole(*hole))
         yield from _silence(begins - written, block)
         written = max(written, begins)
         samples = block.samples[:, written - begins : stop - begins]
         if samples.size:
             yield replace(block, samples=samples)
             written += samples.shape[1]
+            goes_on = True
     if heard is not None:
         yield from _silence(stop - written, heard)
 

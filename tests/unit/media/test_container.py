@@ -124,7 +124,7 @@ def test_a_cover_is_no_film(tmp_path: Path) -> None:
         container.mux(cover.encode(None))
     with open_input(path) as container:
         assert container.streams.video
-        with pytest.raises(InputError, match="it has no pictures in it"):
+        with pytest.raises(InputError, match="it has no video and no pictures in it"):
             find_pictures(container, "it")
 
 
