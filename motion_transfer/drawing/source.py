@@ -68,6 +68,7 @@ class Source:
         visibility: 1 x 1 x T x T, 1 where the texture is seen.
         alpha: How much of each pixel is the person, 0..255, where the IUV was estimated.
         clearance: Of clothes and hair, see `nhrr_core.unfold_clearance`; 0 where it is not known.
+        notes: What the user should know of how the photos are read, in sentences.
     """
 
     photo: Photo
@@ -77,6 +78,7 @@ class Source:
     visibility: Float[Tensor, "1 1 T T"]
     alpha: UInt8[np.ndarray, "H W"] | None = None
     clearance: Float[Tensor, "1 2 128 128"] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def unfold_source(
@@ -105,7 +107,10 @@ def unfold_source(
     ]
     clearance = torch.cat(merge_textures([(c[:, :1], c[:, 1:]) for c in clearances]), dim=1)
     person = pictures[0]
-    return Source(person.photo, person.iuv, iuv_path, texture, visibility, person.alpha, clearance)
+    notes = tuple(note for picture in pictures for note in picture.photo.notes)
+    return Source(
+        person.photo, person.iuv, iuv_path, texture, visibility, person.alpha, clearance, notes
+    )
 
 
 def unfold_picture(

@@ -1,4 +1,4 @@
-"""Native libraries that write to standard error themselves, where only the file descriptor helps."""
+"""Native libraries that write to standard error: only the file descriptor keeps them from it."""
 
 from __future__ import annotations
 

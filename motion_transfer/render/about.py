@@ -131,8 +131,8 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
     except InputError as error:
         try:
             return _describe_photo(path) | ({"not IUV": str(error)} if may_be_iuv else {})
-        except InputError:
-            raise error from None
+        except InputError as no_photo:
+            raise (no_photo if may_be_iuv else error) from None
 
 
 def _describe_shipped(name: str) -> str:
@@ -162,6 +162,10 @@ def _describe_photo(path: Path) -> Facts:
         "size": f"{width} x {height}",
         "alpha": "no" if photo.alpha is None else "yes",
     }
+    if photo.profile:
+        facts["colours"] = f"converted from {photo.profile} to sRGB"
+    if photo.notes:
+        facts["note"] = "; ".join(photo.notes)
     if path.suffix.lower() in PHOTO_SUFFIXES and (clip := open_pictures(path)).frame_count > 1:
         facts |= _describe_length(clip)
     return facts

@@ -155,14 +155,13 @@ def decode_photo(file: Image.Image, path: Path, where: str) -> Photo:
     """
     _check_numbers(file, where)
     notes: list[str] = []
-    turned = _orientation(file) in TURNS
+    said = _orientation(file)
+    if said is None:
+        notes.append(f"the EXIF data of {path} are damaged; the picture is taken as upright")
     with quiet_libraries() if file.format == "TIFF" else nullcontext():
         file.load()  # turns a TIFF, and then says that it is upright
-    orientation = _orientation(file)
-    if orientation is None:
-        notes.append(f"the EXIF data of {path} are damaged; the picture is taken as upright")
     image = _with_8_bits(file)
-    if turn := TURNS.get(orientation):
+    if turn := TURNS.get(_orientation(file)):
         image = image.transpose(turn)
     alpha = image.convert("RGBA").getchannel("A") if image.has_transparency_data else None
     name: str | None = None
@@ -178,7 +177,8 @@ def decode_photo(file: Image.Image, path: Path, where: str) -> Photo:
             )
     # copies of large photos add up: only where something changes
     rgb = np.array(image if image.mode == "RGB" else image.convert("RGB"))
-    return Photo(path, rgb, None if alpha is None else np.array(alpha), turned, name, tuple(notes))
+    opacity = None if alpha is None else np.array(alpha)
+    return Photo(path, rgb, opacity, said in TURNS, name, tuple(notes))
 
 
 def _is_heif(head: bytes) -> bool:

@@ -57,7 +57,8 @@ class PictureStream(ABC):
     Attributes:
         frame_rate: The rate of the frames, or None where they come without one.
         start_seconds: When the first frame is shown, on the clock of the file's sound.
-        notes: What the user should know of how this clip is read, in sentences.
+        notes: What the user should know of how this clip is read, in sentences; there may be more
+            of them when it has been.
     """
 
     def __init__(self, path: Path, frame_count: int, height: int, width: int) -> None:
@@ -113,10 +114,13 @@ class PhotoStream(PictureStream):
         self._files = files or [path]
         first = read_photo(self._files[0], "picture")
         super().__init__(path, len(self._files), *first.rgb.shape[:2])
+        self.notes = first.notes
 
     def read(self) -> Iterator[Frame]:
         for index, file in enumerate(self._files):
-            yield self._check_size(read_photo(file, "picture").on_white(), index)
+            photo = read_photo(file, "picture")
+            self.notes = tuple(dict.fromkeys((*self.notes, *photo.notes)))  # may be read twice
+            yield self._check_size(photo.on_white(), index)
 
     def where(self, index: int) -> str:
         return f"frame {index}, {self._files[index]}" if self.path.is_dir() else str(self.path)

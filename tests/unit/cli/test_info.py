@@ -112,7 +112,7 @@ def test_inspecting_weights(mt, checkpoint: Path) -> None:
     [
         ("none", "does not exist"),
         ("words.txt", "not a readable video"),
-        ("words.png", "not a readable image"),
+        ("words.png", "not a picture in a known format"),
         ("words.safetensors", "not a whole safetensors file"),
         ("empty", "holds no IUV images"),
     ],

@@ -252,7 +252,7 @@ def test_a_file_that_breaks_meanwhile_is_named(run: Run, paint_pairs) -> None:
     trainer = prepare(planned, lambda _event: None)
     for photo in run.folder.parent.glob("photos/*_1.png"):
         photo.write_bytes(b"broken")
-    with pytest.raises(InputError, match=r"^photo \S+_1\.png is not a picture in a known format$"):
+    with pytest.raises(InputError, match=r"^photo \S+_1\.png is not a picture in a known format;"):
         trainer.train()
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import struct
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
+from colour_profiles import DISPLAY_P3
 from PIL import Image, features
 
 from motion_transfer.errors import InputError
@@ -149,10 +151,45 @@ def test_pages_need_one_size(tmp_path: Path) -> None:
 
 def test_a_broken_picture_is_named(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (4, 64, 64, 3), np.uint8)
+    path = save(tmp_path / "a.tif", [Image.fromarray(picture) for picture in noise])
+    data = path.read_bytes()
+    pixels = struct.pack("<I", data.index(noise[2].tobytes()))
+    path.write_bytes(data.replace(pixels, struct.pack("<I", len(data) - 99)))  # where they begin
+    with pytest.raises(InputError, match=r"picture 2 of .*a\.tif is damaged: .*save it again"):
+        open_pictures(path)
+
+
+def test_a_clip_cut_in_the_middle_is_refused(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (4, 64, 64, 3), np.uint8)
     path = save(tmp_path / "a.png", [Image.fromarray(picture) for picture in noise], duration=100)
     path.write_bytes(path.read_bytes()[:30_000])
-    with pytest.raises(InputError, match=r"picture 2 of .*a\.png is damaged: .*save it again"):
+    with pytest.raises(InputError, match=r"a\.png is truncated; save it again"):
         open_pictures(path)
+
+
+@pytest.mark.parametrize("name", [*ANIMATED, "a.tif"])
+def test_colours_become_srgb(tmp_path: Path, name: str) -> None:
+    pictures = [Image.new("RGB", (48, 32), colour) for colour in ((200, 60, 40), (160, 160, 160))]
+    clip = open_pictures(save(tmp_path / name, pictures, icc_profile=DISPLAY_P3))
+    orange, grey = clip.read()
+    assert orange[9, 9].tolist() == pytest.approx([217, 42, 23], abs=5)
+    assert grey[9, 9].tolist() == pytest.approx([160, 160, 160], abs=5)
+    assert clip.notes == ()
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.tif"])
+def test_a_damaged_profile_is_told_once(tmp_path: Path, name: str) -> None:
+    path = save(tmp_path / name, grey(3), icc_profile=DISPLAY_P3[:300])
+    (note,) = open_pictures(path).notes
+    assert note.startswith(f"the colour profile of {path} cannot be used")
+    assert numbers(path) == [0, 1, 2]
+
+
+def test_photos_of_phones_are_no_clips_whatever_they_are_called(tmp_path: Path) -> None:
+    """Depth comes as a second picture."""
+    path = tmp_path / "a.png"
+    grey(1)[0].save(path, "MPO", save_all=True, append_images=grey(2)[1:], quality=100)
+    assert isinstance(open_pictures(path), PhotoStream)
 
 
 def test_a_gif_keeps_its_times(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -132,15 +133,24 @@ def test_a_photo_is_turned_and_laid_on_white(tmp_path: Path) -> None:
     assert frame[32:].min() == 255  # transparent
 
 
-@pytest.mark.parametrize("mode", ["L", "LA", "1", "P", "CMYK", "I;16", "RGBA", "YCbCr", "F"])
+@pytest.mark.parametrize("mode", ["L", "LA", "1", "P", "CMYK", "I;16", "RGBA", "YCbCr"])
 def test_photos_of_every_mode(tmp_path: Path, mode: str) -> None:
-    path = tmp_path / ("a.tif" if mode in ("CMYK", "F", "YCbCr", "LA") else "a.png")
+    path = tmp_path / ("a.tif" if mode in ("CMYK", "YCbCr", "LA") else "a.png")
     grey16 = np.full((8, 6), 200, np.uint8)
     image = Image.fromarray(grey16.astype(np.uint16) * 257) if mode == "I;16" else None
     (image or Image.fromarray(np.dstack([grey16] * 3)).convert(mode)).save(path)
     (frame,) = open_pictures(path).read()
     assert frame.shape == (8, 6, 3)
     assert frame.mean() == pytest.approx(200, abs=16)  # two colours are dithered
+
+
+def test_notes_of_every_photo_are_kept(tmp_path: Path) -> None:
+    for index, profile in enumerate((None, b"none", None, b"none")):
+        Image.fromarray(CORNER).save(tmp_path / f"{index}.png", icc_profile=profile)
+    clip = open_pictures(tmp_path)
+    for _ in range(2):
+        assert len(list(clip.read())) == 4
+    assert [re.findall(r"\d\.png", note) for note in clip.notes] == [["1.png"], ["3.png"]]
 
 
 def test_a_folder_is_a_clip_in_natural_order(tmp_path: Path) -> None:
