@@ -338,6 +338,7 @@ class Session:
         try:
             self.source = self.views.source(draft_of(self.options))
             self.source_people = count_people(self.source, self.options)
+            self._notices += [note for note in self.source.notes if note not in self._notices]
         except Exception as error:  # the page has to say so, whatever it was
             self._errors["source"] = explain(error)
         self._touch()

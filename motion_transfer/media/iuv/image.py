@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
@@ -14,12 +13,10 @@ from motion_transfer.errors import IuvFileError
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.iuv.lookalikes import explain_grey
 from motion_transfer.media.iuv.stream import IuvStream, Raw
+from motion_transfer.media.pictures.png import find_png_fault
 
 LOSSY_SIGNATURES = {b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"\x00\x00\x00\x0cjP": "JPEG 2000"}
 """First bytes of a file and the format that they mean, whatever the file is called."""
-
-PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
-CHUNK_BYTES = 12  # of a PNG's chunk besides its data: length, type and checksum, four each
 
 
 class ImageStream(IuvStream):
@@ -69,8 +66,8 @@ def read_raw_iuv(path: Path, what: str = "IUV") -> Raw:
                 f"{what} {path} is a {name} file; lossy compression destroys part indices,"
                 " export the IUV as PNG"
             )
-    if data.startswith(PNG_SIGNATURE):
-        _check_png(data, f"{what} {path}")
+    if fault := find_png_fault(data):
+        raise IuvFileError(f"{what} {path} is {fault}; export it again")
     pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     if pixels is None:
         raise IuvFileError(f"{what} {path} is not a readable image; export the IUV as PNG")
@@ -82,20 +79,3 @@ def read_raw_iuv(path: Path, what: str = "IUV") -> Raw:
         grey = pixels if pixels.ndim == 2 else pixels[..., 0]
         raise IuvFileError(f"{what} {path} {explain_grey(grey, path.stem)}")
     return cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGB if pixels.shape[2] == 4 else cv2.COLOR_BGR2RGB)
-
-
-def _check_png(data: bytes, where: str) -> None:
-    """Walk a PNG's chunks: decoders return half a picture for half a file without a word."""
-    position = len(PNG_SIGNATURE)
-    while position + CHUNK_BYTES <= len(data):
-        length = int.from_bytes(data[position : position + 4], "big")
-        end = position + CHUNK_BYTES + length
-        if end > len(data):
-            break
-        body = memoryview(data)[position + 4 : end - 4]
-        if zlib.crc32(body) != int.from_bytes(data[end - 4 : end], "big"):
-            raise IuvFileError(f"{where} is damaged (wrong checksum); export it again")
-        if body[:4] == b"IEND":
-            return
-        position = end
-    raise IuvFileError(f"{where} is truncated; export it again")
