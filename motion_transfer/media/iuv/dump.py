@@ -1,63 +1,63 @@
-"""detectron2's DensePose results, as `apply_net.py dump` writes them with `torch.save`.
+"""detectron2's DensePose results, as `apply_net.py dump` writes them.
 
 The file is a list with a dict for each photo: `file_name`, `scores` (N), `pred_boxes_XYXY` (N x 4,
 px) and `pred_densepose`, N objects with `labels` (H x W) and `uv` (2 x H x W, floats), each as
-large as its box. A pickle can run any program; here it is read by torch's unpickler for weights,
-which runs none, and which is told of DensePose's result classes by name. Each of them becomes a
-`_Result`, a plain record. Tensors stay on disk until their frame is read.
+large as its box. Until the middle of 2020 it was one object, whose `results` are N pairs of a shape
+and a PNG. Files of `torch.save`, also of such dumps that somebody changed, are read by torch's
+unpickler for weights, and those of `pickle.dump` by ours: neither runs anything (see `unpickling`).
+In files of `torch.save` tensors stay on disk until their frame is read.
 """
 
 from __future__ import annotations
 
 import base64
-import binascii
+import io
+import math
 import pickle
-import zipfile
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from jaxtyping import UInt8
-from PIL import Image, UnidentifiedImageError
+from PIL import ExifTags, Image
 
 from motion_transfer.errors import IuvFileError
 from motion_transfer.media.iuv.stream import IuvStream, Raw
+from motion_transfer.media.iuv.unpickling import (
+    RECORDS_AND_ARRAYS,
+    PickledArray,
+    Record,
+    unpickle,
+)
 from nhrr_core.iuv import PART_COUNT
 
 LOWEST_SCORE = 0.8  # `apply_net.py show` draws no detection below it; a dump holds them all
-MALFORMED = (ValueError, KeyError, TypeError, IndexError, AttributeError, AssertionError)
-"""What torch's unpickler raises where opcodes do not fit each other."""
-REPICKLE = (
-    "save it again where it was made: torch.save(pickle.load(open('old.pkl', 'rb')), 'new.pkl')"
-)
+ZIP_SIGNATURE = b"PK\x03\x04"
+TORCH_SIGNATURE = b"\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."
+"""What follows the protocol in files of torch before 1.6, which were no archives: a number."""
 
+LARGEST_FRAME = 2**27
+"""Pixels: 16K (15360 x 8640) fits. Boxes may claim anything, and their claim becomes memory."""
 
-class _Result:
-    """What stands for DensePose's result classes: a record of attributes, without behaviour."""
-
-
-RESULT_CLASSES = (
-    "densepose.structures.chart_result.DensePoseChartResult",
-    "densepose.structures.chart_result.DensePoseChartResultWithConfidences",
-    "densepose.structures.chart_result.DensePoseChartResultQuantized",
-    "densepose.structures.chart_result.DensePoseChartResultCompressed",
-    "densepose.vis.extractor.DensePoseChartResultWithConfidences",
-)
+NOBODY = np.zeros((0, 4))  # boxes of
+LONGEST_NAME = 4096  # the longest path that Linux opens
+TURNED = (5, 6, 7, 8)  # EXIF's orientations with width and height swapped; detectron2 heeds them
 
 
 class DumpStream(IuvStream):
-    """Frames of a dump, one for each photo in it, in its order; everybody scored 0.8 or more.
+    """Frames of a dump, one for each of the photos; everybody scored 0.8 or more.
 
     A dump does not say how large its photos were. They are looked for by name; where one is gone,
     the frame is as large as the boxes of all photos need.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._photos = _load(path)
-        super().__init__(path, "detectron2 dump", len(self._photos))
+    def __init__(self, path: Path, photos: list[dict[str, Any]]) -> None:
+        self._photos = photos
+        super().__init__(path, "detectron2 dump", len(photos))
         self.order = "iuv"
         self._sizes = self._find_sizes()
 
@@ -66,76 +66,96 @@ class DumpStream(IuvStream):
             yield self._draw(index)
 
     def where(self, index: int) -> str:
-        return f"frame {index} of {self.path} ({_name(self._photos[index])})"
+        name = _name(self._photos[index]) or "unnamed"
+        return f"frame {index} of {self.path} ({shorten(name, 200)})"
 
     def _draw(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
         """Draw the people of a frame in order of score, so that the surest stands in front."""
-        photo, where = self._photos[index], self.where(index)
+        where = self.where(index)
         height, width = self._sizes[index]
         frame = np.zeros((height, width, 3), np.uint8)
-        boxes, scores = _boxes(photo, where), _scores(photo, where)
-        results = _results(photo, where, len(boxes))
+        boxes, scores, results = _people(self._photos[index], where)
         for person in np.argsort(scores, kind="stable"):
             if scores[person] < LOWEST_SCORE:
                 continue
+            patch = _patch(results[person], where)
             # a box may begin between pixels, and outside the photo
-            left, top = (max(0, int(edge)) for edge in boxes[person][:2])
-            patch = _patch(results[person], where)[: height - top, : width - left]
-            target = frame[top : top + patch.shape[0], left : left + patch.shape[1]]
+            left, top = (math.floor(edge) for edge in boxes[person][:2])
+            patch = patch[max(0, -top) :, max(0, -left) :]
+            target = frame[max(0, top) :, max(0, left) :][: len(patch), : patch.shape[1]]
+            patch = patch[: len(target), : target.shape[1]]
             np.copyto(target, patch, where=patch[..., :1] > 0)
         return frame
 
     def _find_sizes(self) -> list[tuple[int, int]]:
-        """Find (height, width) of every frame."""
+        """Find (height, width) of every frame. Raises: IuvFileError for one that is too large."""
         found = [_photo_size(self.path, _name(photo)) for photo in self._photos]
-        if all(found):
-            return [size for size in found if size]
-        need = np.ones(2, int)  # a frame without anybody has a pixel, too
-        for index, photo in enumerate(self._photos):
-            boxes = _boxes(photo, self.where(index))
-            if len(boxes):
-                need = np.maximum(need, np.ceil(boxes[:, [3, 2]].max(0)).astype(int))
-        height, width = (int(side) for side in need)
-        self.notes = (
-            "a dump does not say how large its photos were, and"
-            f" {sum(size is None for size in found)} of {len(found)} are not beside it:"
-            f" {width} x {height}, which the boxes need, is taken",
-        )
-        return [(height, width)] * len(found)
-
-
-def _load(path: Path) -> list[dict[str, Any]]:
-    """Read the dump's list. Raises: IuvFileError if it is no dump, or could run code."""
-    allowed: list[Any] = [(_Result, name) for name in RESULT_CLASSES]
-    try:
-        with torch.serialization.safe_globals(allowed):
-            # files from before torch 1.6 are no archives, and cannot be mapped
-            photos = torch.load(
-                path, map_location="cpu", weights_only=True, mmap=zipfile.is_zipfile(path)
+        sizes = [size for size in found if size]
+        if len(sizes) < len(found):
+            need = np.ones(2)  # a frame without anybody has a pixel, too
+            for index, photo in enumerate(self._photos):
+                boxes, _, _ = _people(photo, self.where(index))
+                need = np.maximum(need, np.ceil(boxes[:, [3, 2]].max(0, initial=1)))
+            height, width = (int(side) for side in need)
+            self.notes = (
+                "a dump does not say how large its photos were, and"
+                f" {len(found) - len(sizes)} of {len(found)} are not beside it:"
+                f" {width} x {height}, which the boxes need, is taken",
             )
-    except (pickle.UnpicklingError, RuntimeError, EOFError, OSError, *MALFORMED) as error:
-        raise IuvFileError(_explain(path, error)) from None
+            sizes = [(height, width)] * len(found)
+        for index, (height, width) in enumerate(sizes):
+            if height * width > LARGEST_FRAME:
+                raise IuvFileError(
+                    f"{self.where(index)} needs {width} x {height} px; at most {LARGEST_FRAME:,} px"
+                    " are drawn, which is 16K; dump smaller photos"
+                )
+        return sizes
+
+
+def list_photos(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
+    """Read a dump's list, in its order, with what each photo is called.
+
+    Raises: IuvFileError if it is no dump, or could run code.
+    """
+    photos = _load(path)
     if not isinstance(photos, list) or not all(isinstance(photo, dict) for photo in photos):
         raise IuvFileError(
             f"{path} holds a {type(photos).__name__}; a detectron2 dump is a list with one dict for"
             " each photo"
         )
-    return photos
+    for index, photo in enumerate(photos):
+        name = photo.get("file_name")
+        if name is not None and (not isinstance(name, str) or len(name) > LONGEST_NAME):
+            raise IuvFileError(
+                f"frame {index} of {path}: file_name is no path; dump it again with apply_net.py"
+            )
+    return [(_name(photo), photo) for photo in photos]
 
 
-def _explain(path: Path, error: Exception) -> str:
-    reason = str(error)
-    if any(mark in reason for mark in ("magic number", "_load_from_bytes")):
-        return f"{path} was written by pickle, not by torch.save; {REPICKLE}"
-    if isinstance(error, pickle.UnpicklingError):
-        return (
+def _load(path: Path) -> Any:
+    allowed: list[Any] = [(stand_in, name) for name, stand_in in RECORDS_AND_ARRAYS.items()]
+    try:
+        with path.open("rb") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of protocols that torch.save does not take by itself
+            beginning = file.read(64)
+            zipped = beginning.startswith(ZIP_SIGNATURE)
+            if not zipped and TORCH_SIGNATURE not in beginning:
+                file.seek(0)
+                return unpickle(file)
+            with torch.serialization.safe_globals(allowed):
+                # files from before torch 1.6 are no archives, and cannot be mapped
+                return torch.load(path, map_location="cpu", weights_only=True, mmap=zipped)
+    except pickle.UnpicklingError as error:
+        raise IuvFileError(
             f"{path} is refused: it holds more than DensePose results and could run code when read"
-            f" ({_first_sentence(reason)})"
-        )
-    return (
-        f"{path} is not a whole detectron2 dump ({_first_sentence(reason)}); write it again with"
-        " apply_net.py dump"
-    )
+            f" ({_first_sentence(str(error))}); write it again with apply_net.py dump"
+        ) from None
+    except Exception as error:  # opcodes that do not fit each other bring about any
+        reason = _first_sentence(str(error)) or type(error).__name__
+        raise IuvFileError(
+            f"{path} is not a whole detectron2 dump ({reason}); write it again with"
+            " apply_net.py dump"
+        ) from None
 
 
 def _first_sentence(reason: str) -> str:
@@ -143,90 +163,151 @@ def _first_sentence(reason: str) -> str:
     for line in reason.splitlines():
         for mark in ("Unsupported global", "Trying to", "Can only", "Unsupported operand"):
             if mark in line:
-                return line[line.index(mark) :].split(". ")[0].strip()
-    return reason.splitlines()[0] if reason else "no reason given"
+                return shorten(line[line.index(mark) :].split(". ")[0], 200)
+    return shorten(reason.partition("\n")[0], 200)
 
 
-def _name(photo: dict[str, Any]) -> str:
-    return str(photo.get("file_name", "unnamed"))
+def _name(photo: dict[str, Any]) -> str | None:
+    return photo.get("file_name")
 
 
-def _photo_size(dump: Path, name: str) -> tuple[int, int] | None:
+def _photo_size(dump: Path, name: str | None) -> tuple[int, int] | None:
     """Find (height, width) of a photo that a dump names: beside the dump, or where it says."""
+    if not name:
+        return None
     for candidate in (dump.parent / Path(name).name, dump.parent / name, Path(name)):
-        if candidate.is_file():
-            try:
-                with Image.open(candidate) as file:
-                    return file.height, file.width
-            except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError):
-                continue
+        try:
+            if candidate.is_file():
+                with _open_picture(candidate) as file:
+                    # a PNG is decoded to the end where it may have an orientation
+                    exif = file.getexif() if file.format != "PNG" else {}
+                    turned = exif.get(ExifTags.Base.Orientation) in TURNED
+                    return (file.width, file.height) if turned else (file.height, file.width)
+        except Exception:  # whatever is wrong with a picture, or a name: it is not the photo
+            continue
     return None
 
 
-def _array(value: Any, what: str, where: str) -> np.ndarray:
-    if not isinstance(value, torch.Tensor):
-        raise IuvFileError(f"{where}: {what} is a {type(value).__name__}, not a tensor")
-    return value.detach().cpu().numpy()
+def _open_picture(source: Path | io.BytesIO, formats: tuple[str, ...] | None = None) -> Image.Image:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # its size is looked at
+        return Image.open(source, formats=formats)
 
 
-def _boxes(photo: dict[str, Any], where: str) -> np.ndarray:
-    if "pred_boxes_XYXY" not in photo:
-        return np.zeros((0, 4))
-    boxes = _array(photo["pred_boxes_XYXY"], "pred_boxes_XYXY", where)
-    if boxes.ndim != 2 or boxes.shape[1] != 4 or not np.isfinite(boxes).all():
+def _people(photo: dict[str, Any], where: str) -> tuple[np.ndarray, np.ndarray, list[Record]]:
+    """Take apart what is known of a photo.
+
+    Returns: Boxes (N x 4, px), scores (N) and results (N).
+    Raises: IuvFileError where they do not fit each other.
+    """
+    boxes = _numbers(photo.get("pred_boxes_XYXY", NOBODY), "pred_boxes_XYXY", where)
+    if boxes.ndim != 2 or boxes.shape[1] != 4:
         raise IuvFileError(f"{where}: pred_boxes_XYXY is {list(boxes.shape)}, not N x 4 numbers")
-    return boxes
-
-
-def _scores(photo: dict[str, Any], where: str) -> np.ndarray:
-    count = len(_boxes(photo, where))
-    scores = _array(photo["scores"], "scores", where) if "scores" in photo else np.ones(count)
-    if scores.shape != (count,):
-        raise IuvFileError(f"{where}: {len(scores)} scores for {count} boxes")
-    return scores
-
-
-def _results(photo: dict[str, Any], where: str, count: int) -> list[Any]:
     results = photo.get("pred_densepose", [])
-    if not isinstance(results, (list, tuple)) or len(results) != count:
+    if isinstance(results, Record):
+        results = _split(results, where)
+    if not isinstance(results, (list, tuple)) or len(results) != len(boxes):
+        held = len(results) if isinstance(results, (list, tuple)) else type(results).__name__
         raise IuvFileError(
-            f"{where}: {count} boxes, but pred_densepose holds"
-            f" {len(results) if isinstance(results, (list, tuple)) else type(results).__name__};"
-            " dump it with a chart-based (IUV) model"
+            f"{where}: {len(boxes)} boxes, but pred_densepose holds {held}; dump it with a"
+            " chart-based (IUV) model"
         )
-    return list(results)
+    scores = _numbers(photo.get("scores", np.ones(len(boxes))), "scores", where)
+    if scores.shape != (len(boxes),):
+        raise IuvFileError(
+            f"{where}: {len(scores) if scores.ndim else 'no'} scores for {len(boxes)} boxes"
+        )
+    for what, values in (("pred_boxes_XYXY", boxes), ("scores", scores)):
+        if not np.isfinite(values).all():
+            raise IuvFileError(f"{where}: {what} holds NaN or infinity; dump it again")
+    return boxes, scores, list(results)
 
 
-def _patch(result: Any, where: str) -> UInt8[np.ndarray, "H W 3"]:
+def _split(result: Record, where: str) -> list[Record]:
+    """Make of one result of 2020 one for each person."""
+    pairs = vars(result).get("results")
+    if not isinstance(pairs, list) or not all(isinstance(p, tuple) and len(p) == 2 for p in pairs):
+        raise IuvFileError(f"{where}: pred_densepose holds no results; dump it with an IUV model")
+    people = [Record() for _ in pairs]
+    for person, (_, png) in zip(people, pairs, strict=True):
+        vars(person)["labels_uv_str"] = png
+    return people
+
+
+def _numbers(value: object, what: str, where: str, kinds: str = "iuf") -> np.ndarray:
+    """View a tensor or an array. Raises: IuvFileError unless its type is of one of `kinds`."""
+    if isinstance(value, PickledArray):
+        value = value.array
+    elif isinstance(value, torch.Tensor):
+        try:
+            value = value.detach().cpu()
+            # which NumPy has not got
+            value = (value.float() if value.dtype == torch.bfloat16 else value).numpy()
+        except (RuntimeError, TypeError) as error:  # sparse, quantised, without numbers, ...
+            raise IuvFileError(f"{where}: {what} is an odd tensor ({error})") from None
+    if not isinstance(value, np.ndarray):
+        raise IuvFileError(f"{where}: {what} is a {type(value).__name__}, not a tensor")
+    if value.dtype.kind not in kinds:
+        wanted = {"iu": "whole numbers", "f": "fractions"}.get(kinds, "numbers")
+        raise IuvFileError(f"{where}: {what} holds {value.dtype}, and not {wanted}")
+    return value
+
+
+def _patch(result: object, where: str) -> UInt8[np.ndarray, "H W 3"]:
     """Draw (I, U, V) of one person, as large as the box."""
-    held = vars(result) if isinstance(result, _Result) else {}
+    held = vars(result) if isinstance(result, Record) else {}
     if "labels" in held and "uv" in held:
-        labels, uv = _array(held["labels"], "labels", where), _array(held["uv"], "uv", where)
-        if labels.ndim != 2 or uv.shape != (2, *labels.shape):
+        return _quantise(held["labels"], held["uv"], where)
+    if "labels_uv_uint8" in held:
+        planes = _numbers(held["labels_uv_uint8"], "labels_uv_uint8", where, "iu")
+        if planes.dtype != np.uint8 or planes.ndim != 3 or len(planes) != 3:
             raise IuvFileError(
-                f"{where}: labels are {list(labels.shape)} and uv {list(uv.shape)}; they are H x W"
-                " and 2 x H x W"
+                f"{where}: labels_uv_uint8 is {planes.dtype} {list(planes.shape)}; it is uint8,"
+                " 3 x H x W"
             )
-        patch = np.empty((*labels.shape, 3), np.uint8)
-        patch[..., 0] = np.clip(labels, 0, 255)
-        patch[..., 1:] = np.clip(np.nan_to_num(uv.transpose(1, 2, 0)) * 255, 0, 255).round()
-    elif "labels_uv_uint8" in held:
-        patch = _array(held["labels_uv_uint8"], "labels_uv_uint8", where).transpose(1, 2, 0)
+        patch = planes.transpose(1, 2, 0)
     elif "labels_uv_str" in held:
-        patch = _unpack_png(str(held["labels_uv_str"]), where)
+        patch = _unpack_png(held["labels_uv_str"], where)
     else:
         raise IuvFileError(f"{where}: a result without labels and uv; dump it with an IUV model")
-    if patch.dtype != np.uint8 or patch[..., 0].max(initial=0) > PART_COUNT:
-        raise IuvFileError(f"{where}: labels are not part indices, 0 to {PART_COUNT}")
+    _check_parts(patch[..., 0], where)
     return patch
 
 
-def _unpack_png(text: str, where: str) -> UInt8[np.ndarray, "H W 3"]:
+def _quantise(labels: object, uv: object, where: str) -> UInt8[np.ndarray, "H W 3"]:
+    parts, places = _numbers(labels, "labels", where, "iu"), _numbers(uv, "uv", where, "f")
+    if parts.ndim != 2 or places.shape != (2, *parts.shape):
+        raise IuvFileError(
+            f"{where}: labels are {list(parts.shape)} and uv {list(places.shape)}; they are H x W"
+            " and 2 x H x W"
+        )
+    _check_parts(parts, where)
+    covered = places[:, parts > 0]
+    if not np.isfinite(covered).all() or (covered.size and covered.mean() > 1):
+        raise IuvFileError(f"{where}: uv is not within 0..1; dump it again")
+    patch = np.zeros((*parts.shape, 3), np.uint8)
+    patch[..., 0] = parts
+    # the network may overshoot
+    patch[parts > 0, 1:] = np.clip(covered.T * 255, 0, 255).round()
+    return patch
+
+
+def _check_parts(parts: np.ndarray, where: str) -> None:
+    if parts.size > LARGEST_FRAME:
+        raise IuvFileError(f"{where}: a person of {list(parts.shape)} px; dump it again")
+    if parts.min(initial=0) < 0 or parts.max(initial=0) > PART_COUNT:
+        raise IuvFileError(f"{where}: labels are not part indices, 0 to {PART_COUNT}")
+
+
+def _unpack_png(text: object, where: str) -> UInt8[np.ndarray, "H W 3"]:
     try:
-        packed = np.frombuffer(base64.decodebytes(text.encode("ascii")), np.uint8)
-        pixels = cv2.imdecode(packed, cv2.IMREAD_COLOR) if packed.size else None
-    except (binascii.Error, UnicodeEncodeError) as error:
-        raise IuvFileError(f"{where}: a compressed result is damaged ({error})") from error
-    if pixels is None:
-        raise IuvFileError(f"{where}: a compressed result is damaged; dump it again")
-    return np.ascontiguousarray(pixels[..., ::-1])
+        packed = base64.decodebytes(str(text).encode("ascii") if isinstance(text, str) else b"")
+        with _open_picture(io.BytesIO(packed), formats=("PNG",)) as file:
+            if file.mode != "RGB" or file.width * file.height > LARGEST_FRAME:
+                raise ValueError(f"it is {file.mode}, {file.width} x {file.height} px")
+            return np.asarray(file)
+    except Exception as error:  # a picture can be broken in any way
+        reason = shorten(str(error), 100)
+        raise IuvFileError(
+            f"{where}: a compressed result is damaged ({reason}); dump it again"
+        ) from None

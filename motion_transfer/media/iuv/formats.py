@@ -35,10 +35,13 @@ class IuvFormat:
         name: What a file of this format is.
         opener: Makes the stream of a path, as `package.module:name`.
         folder_opener: Makes the stream of a folder with such a file for each frame, from the
-            folder, its files, the numbers missing among them, and the indices of frames that show
-            nobody; empty where no folders of this format are read.
+            folder and its files, in the order of frames; empty where no folders of this format are
+            read.
         suffixes: File name endings, lower case.
         scheme: What names begin with that are no files; empty for files.
+        lister: Lists what a file holds for each frame, as pairs of a name (or None) and whatever
+            `opener` understands, which then gets the path and a list of those, in the order of
+            frames; empty where a file's frames have no names.
         always_iuv: Whether the name alone says that it is IUV; of others the first frames are
             looked at, since they may be pictures of a person as well.
         several: Whether one file may hold several frames.
@@ -52,6 +55,7 @@ class IuvFormat:
     folder_opener: str = ""
     suffixes: tuple[str, ...] = ()
     scheme: str = ""
+    lister: str = ""
     always_iuv: bool = False
     several: bool = True
     has_sound: bool = False
@@ -96,6 +100,7 @@ IUV_FORMATS = [
     IuvFormat(
         "detectron2 dump",
         f"{HERE}.dump:DumpStream",
+        lister=f"{HERE}.dump:list_photos",
         suffixes=(".pkl", ".pickle", ".pth", ".pt"),
         always_iuv=True,
         help="detectron2's results.pkl",

@@ -20,29 +20,17 @@ LOSSY_SIGNATURES = {b"\xff\xd8\xff": "JPEG", b"RIFF": "WebP", b"\x00\x00\x00\x0c
 
 
 class ImageStream(IuvStream):
-    """A folder of IUV images in natural order, or a single one (`files` None).
+    """A folder with an IUV image for each frame, or a single one (`files` None)."""
 
-    A missing number's place is taken by the file before it, or, in `blank`, by nobody.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        files: list[Path] | None = None,
-        gaps: tuple[int, ...] = (),
-        blank: frozenset[int] = frozenset(),
-    ) -> None:
+    def __init__(self, path: Path, files: list[Path] | None = None) -> None:
         self.files = files or [path]
         super().__init__(
             path, "folder of IUV images" if path.is_dir() else "IUV image", len(self.files)
         )
-        self.gaps = gaps
-        self._blank = blank
 
     def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
         for index in range(start, stop):
-            raw = read_raw_iuv(self.files[index], f"frame {index},")
-            yield np.zeros_like(raw) if index in self._blank else raw
+            yield read_raw_iuv(self.files[index], f"frame {index},")
 
     def where(self, index: int) -> str:
         return f"frame {index}, {self.files[index]}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -9,34 +11,39 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError, IuvFileError
-from motion_transfer.media.folders import fill_gaps, list_files, list_gaps
+from motion_transfer.media.files import check_readable
+from motion_transfer.media.folders import Numbering, list_files, list_gaps, number_frames
 from motion_transfer.media.iuv.formats import (
     CHANNEL_ORDERS,
     IUV_FORMATS,
     ChannelOrder,
+    IuvFormat,
     Missing,
     find_iuv_format,
     names_file,
 )
 from motion_transfer.media.iuv.image import read_raw_iuv
-from motion_transfer.media.iuv.stream import IuvReader, IuvStream, decide_order, to_iuv
+from motion_transfer.media.iuv.stream import IuvReader, IuvStream, Raw, decide_order, to_iuv
 
 
 def open_stream(path: Path, *, missing: Missing = "fail") -> IuvStream:
     """Open a driver by what it is: a folder, a file of any format in the table, or a motion.
 
     Args:
-        missing: What a number missing from a folder does: `fail`, `hold` (the frame before is
-            repeated) or `background` (a frame without anybody).
+        missing: What a number missing from a folder or a dump does: `fail`, `hold` (the frame
+            before is repeated) or `background` (a frame without anybody).
     Raises: InputError if it is missing or empty; IuvFileError if it is not IUV.
     """
-    if names_file(path) and not path.exists():
-        raise InputError(f"driver {path} does not exist")
+    if names_file(path):
+        check_readable(path, "driver", folder=True)
+    row = find_iuv_format(path)
     stream: IuvStream
     if path.is_dir():  # what a folder is called says nothing of what lies in it
         stream = _open_folder(path, missing)
+    elif row.lister:
+        stream = _open_listed(path, row, missing)
     else:
-        stream = resolve_name(find_iuv_format(path).opener)(path)
+        stream = resolve_name(row.opener)(path)
     if stream.frame_count == 0:
         raise InputError(f"driver {path} holds no frames")
     return stream
@@ -73,8 +80,8 @@ def read_single_iuv(
     if not find_iuv_format(path).always_iuv:
         raw = read_raw_iuv(path, what)  # a picture's IUV is a picture, and not a video
     else:
-        if not path.exists():
-            raise InputError(f"{where} does not exist")
+        if names_file(path):
+            check_readable(path, what)
         stream = open_stream(path)
         if stream.frame_count != 1:
             raise IuvFileError(
@@ -104,12 +111,60 @@ def _open_folder(path: Path, missing: Missing) -> IuvStream:
         raise InputError(f"driver {path} holds no IUV images ({', '.join(rows[0].suffixes)})")
     # photos may lie between the IUV that was made of them
     named = [file for file in frames[chosen.name] if file.stem.lower().endswith("iuv")]
-    files, gaps = fill_gaps(named or frames[chosen.name])
-    if gaps and missing == "fail":
+    files = named or frames[chosen.name]
+    numbering = number_frames([file.name for file in files], f"driver {path}")
+    return _open_numbered(path, chosen.folder_opener, files, numbering, missing)
+
+
+def _open_listed(path: Path, row: IuvFormat, missing: Missing) -> IuvStream:
+    """Open a file that holds frames by name, in the order of the names where these are numbered."""
+    listed: list[tuple[str | None, object]] = resolve_name(row.lister)(path)
+    names = [name for name, _ in listed if name and any(map(str.isdecimal, Path(name).name))]
+    numbering, note = Numbering(range(len(listed))), ""
+    if len(names) == len(listed):
+        twice = next((name for name, count in Counter(names).items() if count > 1), None)
+        if twice:
+            note = f"{twice} is in it more than once: frames play in the order of the file"
+        else:
+            numbering = number_frames(names, f"driver {path}")
+            if list(dict.fromkeys(numbering.order)) != list(range(len(listed))):
+                note = "frames play in the order of their numbers, and not in that of the file"
+    stream = _open_numbered(path, row.opener, [item for _, item in listed], numbering, missing)
+    stream.notes += (note,) if note else ()
+    return stream
+
+
+def _open_numbered(
+    path: Path, opener: str, items: Sequence[object], numbering: Numbering, missing: Missing
+) -> IuvStream:
+    """Open items as frames in their order, with missing numbers' places filled."""
+    if numbering.gaps and missing == "fail":
         raise InputError(
-            f"driver {path}: {list_gaps(gaps)}; add the files, or repeat the frame before with"
-            " --missing hold"
+            f"driver {path}: {list_gaps(numbering.gaps)}; add the files, or repeat the frame before"
+            " with --missing hold"
         )
-    repeated = (i for i in range(1, len(files)) if files[i] == files[i - 1])
-    blank = frozenset(repeated if missing == "background" else ())
-    return resolve_name(chosen.folder_opener)(path, files, gaps, blank)
+    stream: IuvStream = resolve_name(opener)(path, [items[index] for index in numbering.order])
+    if missing == "background":
+        stream = _BlankedStream(stream, numbering.held)
+    stream.gaps = numbering.gaps
+    return stream
+
+
+class _BlankedStream(IuvStream):
+    """Another stream, some of whose frames show nobody."""
+
+    def __init__(self, stream: IuvStream, blank: frozenset[int]) -> None:
+        super().__init__(stream.path, stream.kind, stream.frame_count)
+        self.frame_rate, self.order, self.notes = stream.frame_rate, stream.order, stream.notes
+        self._stream = stream
+        self._blank = blank
+
+    def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
+        for index, raw in enumerate(self._stream.read_raw(start, stop), start):
+            yield np.zeros_like(raw) if index in self._blank else raw
+
+    def where(self, index: int) -> str:
+        return self._stream.where(index)
+
+    def closing_notes(self) -> tuple[str, ...]:
+        return self._stream.closing_notes()

@@ -171,10 +171,10 @@ def _open_video(path: Path, settings: IuvOutput, channels: tuple[int, ...]) -> I
 @contextmanager
 def _open_array(path: Path, settings: IuvOutput, channels: tuple[int, ...]) -> Iterator[Write]:
     shape = (settings.frame_count, settings.height, settings.width, *channels)
-    stack = np.lib.format.open_memmap(path, mode="w+", dtype=np.uint8, shape=shape)
-    rows = iter(stack)
-    yield lambda plane: np.copyto(next(rows), plane)
-    stack.flush()
+    header = {"descr": "|u1", "fortran_order": False, "shape": shape}
+    with path.open("wb") as file:  # a mapped file ends the process where the disk is full
+        np.lib.format.write_array_header_1_0(file, header)
+        yield lambda plane: file.write(plane.data)
 
 
 FORMS = {"": _open_folder, ".png": _open_png, ".mkv": _open_video, ".npy": _open_array}

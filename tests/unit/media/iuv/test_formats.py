@@ -314,12 +314,10 @@ def test_the_source_may_be_an_array(studio) -> None:
 class ToyStream(IuvStream):
     """Frames of 96 x 64 px, one after the other, without a header."""
 
-    def __init__(self, path: Path, files=None, gaps=(), blank=frozenset()) -> None:
+    def __init__(self, path: Path, files=None) -> None:
         data = b"".join(file.read_bytes() for file in files or [path])
-        self._frames = np.frombuffer(data, np.uint8).reshape(-1, 96, 64, 3).copy()
-        self._frames[list(blank)] = 0
+        self._frames = np.frombuffer(data, np.uint8).reshape(-1, 96, 64, 3)
         super().__init__(path, "folder of toys" if files else "toy", len(self._frames))
-        self.gaps = gaps
 
     def read_raw(self, start: int, stop: int) -> Iterator[np.ndarray]:
         yield from self._frames[start:stop]
