@@ -183,11 +183,15 @@ def convert(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
 def repair(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
     """Fill gaps, remove speckles, and steady a driver; any length.
 
+    IUV that was resized with interpolation is mended without being asked: pixels whose part is
+    found nowhere near, blends of those around them, take the nearest other pixel.
+
     Flicker is reported before and after: the share of the body's pixels whose part comes and goes
     within one frame, and how far U and V are from the mean of their neighbours in time.
 
     \b
     mt iuv repair dance_iuv/ -o steady.mkv --fill-gaps interpolate --speckle 20 --smooth
+    mt iuv repair resized_iuv/ -o mended_iuv/
     """
     from motion_transfer.repair.run import RepairOptions, repair_iuv
 

@@ -23,6 +23,7 @@ from motion_transfer.drawing.person import (
     occupancy,
 )
 from motion_transfer.errors import InputError
+from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.media.nearest import take_nearest
@@ -107,10 +108,17 @@ def unfold_source(
     ]
     clearance = torch.cat(merge_textures([(c[:, :1], c[:, 1:]) for c in clearances]), dim=1)
     person = pictures[0]
-    notes = tuple(note for picture in pictures for note in picture.photo.notes)
+    notes = tuple(note for picture in pictures for note in _list_notes(picture))
     return Source(
         person.photo, person.iuv, iuv_path, texture, visibility, person.alpha, clearance, notes
     )
+
+
+def _list_notes(picture: SourcePicture) -> list[str]:
+    blends = BlendMeter()
+    blends.add(picture.iuv)
+    warning = blends.warn(f"the IUV of {picture.photo.path}")
+    return [*picture.photo.notes, *([warning] if warning else [])]
 
 
 def unfold_picture(

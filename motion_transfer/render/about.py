@@ -21,6 +21,7 @@ from motion_transfer.estimate.iuv.network import SHIPPED as IUV_NETWORK
 from motion_transfer.estimate.iuv.network import has_shipped
 from motion_transfer.estimate.models import MODEL_FILES, is_there, models_folder
 from motion_transfer.extras import install_command, missing_packages
+from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import (
     CHANNEL_ORDERS,
     ChannelOrder,
@@ -187,15 +188,19 @@ def _describe_iuv(path: Path, order: str | None) -> Facts:
     reader = open_reader(stream, cast(ChannelOrder | None, order))
     pixels = np.zeros(len(PART_NAMES), np.int64)
     crowd: Counter[int] = Counter()
+    blends = BlendMeter()
     for iuv in reader.read(0, stream.frame_count):
         pixels += np.bincount(iuv[..., 0].reshape(-1), minlength=len(PART_NAMES))
         crowd[len(find_people(iuv).persons)] += 1
+        blends.add(iuv)
     facts: Facts = {
         "what": stream.kind,
         "channel order": ORDER_WORDS[reader.order],
         "size": f"{reader.width} x {reader.height}",
         **_describe_length(stream),
     }
+    if warning := blends.warn("it"):
+        facts["warning"] = warning
     facts["missing numbers"] = list(stream.gaps) or "none"
     facts["people a frame"] = {f"{n} people": f"{f} frames" for n, f in sorted(crowd.items())}
     shares = pixels[1:] / max(1, pixels[1:].sum())

@@ -14,6 +14,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.events import FramesDone, Listener, Notice, Stage
 from motion_transfer.media.driver_kind import tell_kind
 from motion_transfer.media.folders import list_gaps
+from motion_transfer.media.iuv.blends import look_for_blends
 from motion_transfer.media.iuv.formats import ChannelOrder, Missing, names_file
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvReader
@@ -168,6 +169,9 @@ def scan_driver(
     """
     driver = open_driver(options, folder, listener)
     chosen = frame_range(options.frames, driver.frame_count, str(options.driver))
+    if names_file(options.driver) and not driver.pictures:  # who draws IUV here does not blend it
+        if warning := look_for_blends(driver.reader, chosen).warn(f"driver {options.driver}"):
+            listener(Notice(warning))
     listener(Stage("scan", len(chosen)))
     seen = scan_people(
         driver.reader,

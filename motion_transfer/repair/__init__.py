@@ -1,1 +1,1 @@
-"""Repairs of IUV sequences: frames without people, speckles, trembling borders; all streaming."""
+"""Repairs of IUV sequences: blends, speckles, frames without people, trembling borders; all streaming."""

@@ -26,6 +26,7 @@ import numpy as np
 
 from motion_transfer.drawing.person import bounding_box
 from motion_transfer.errors import InputError
+from motion_transfer.media.iuv.blends import look_for_blends, mend_blends
 from motion_transfer.media.iuv.convert import ConvertOptions, open_source
 from motion_transfer.media.iuv.writing import write_iuv
 from motion_transfer.media.nearest import take_nearest
@@ -105,6 +106,8 @@ class RepairOptions(ConvertOptions):
         fill_gaps: How to fill frames without anybody: `hold` or `interpolate`; None: not at all.
         speckle: Regions of one part of fewer pixels are removed; 0: none.
         smooth: Whether to steady part borders and U, V over time.
+
+    IUV that interpolation has blended is mended whatever they say.
     """
 
     fill_gaps: FillGaps | None = None
@@ -118,10 +121,6 @@ class RepairOptions(ConvertOptions):
             )
         if self.speckle < 0:
             raise InputError(f"speckle {self.speckle}; it is a number of pixels, 0 or more")
-        if not (self.fill_gaps or self.speckle or self.smooth):
-            raise InputError(
-                "nothing to repair: add --fill-gaps hold or interpolate, --speckle 20, or --smooth"
-            )
 
 
 @dataclass(frozen=True)
@@ -133,8 +132,16 @@ class RepairReport:
     notes: tuple[str, ...]
 
 
-def repair(frames: Iterable[Frame], options: RepairOptions) -> Iterator[Frame]:
-    """Remove speckles, then fill gaps, then smooth; a few frames are kept at a time."""
+def repair(
+    frames: Iterable[Frame], options: RepairOptions, *, blended: bool = False
+) -> Iterator[Frame]:
+    """Mend blends, remove speckles, then fill gaps, then smooth; a few frames are kept at a time.
+
+    Args:
+        blended: Whether there are blends.
+    """
+    if blended:
+        frames = map(mend_blends, frames)
     # speckles first: a frame of nothing else is a gap, and no gap is to be filled with them
     if options.speckle:
         frames = map(partial(remove_speckles, smallest_px=options.speckle), frames)
@@ -148,13 +155,26 @@ def repair_iuv(options: RepairOptions, done: Callable[[int], object] = int) -> R
 
     Args:
         done: Called with 1 after each frame.
-    Raises: InputError and its kinds; nothing half-written stays behind.
+    Raises: InputError and its kinds, also if there is nothing to repair; nothing half-written
+        stays behind.
     """
     source = open_source(options)
+    blends = look_for_blends(source.reader, range(source.settings.frame_count))
+    notes = list(source.notes)
+    if blends.found:
+        notes.append(
+            f"{options.source} was resized with interpolation, or smoothed: the {blends.share:.0%}"
+            " of the body's pixels that have a part found nowhere near take the nearest other pixel"
+        )
+    elif not (options.fill_gaps or options.speckle or options.smooth):
+        raise InputError(
+            f"nothing to repair: {options.source} is not blended by interpolation; for more, add"
+            " --fill-gaps hold or interpolate, --speckle 20, or --smooth"
+        )
     before, after = FlickerMeter(), FlickerMeter()
-    frames = before.watch(source.frames())
-    write_iuv(after.watch(repair(frames, options)), options.output, source.settings, done)
-    return RepairReport(before.result, after.result, tuple(source.notes))
+    repaired = repair(before.watch(source.frames()), options, blended=blends.found)
+    write_iuv(after.watch(repaired), options.output, source.settings, done)
+    return RepairReport(before.result, after.result, tuple(notes))
 
 
 def remove_speckles(iuv: Frame, smallest_px: int) -> Frame:
