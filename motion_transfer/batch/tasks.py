@@ -57,7 +57,7 @@ class Outline:
     Attributes:
         chunks_at_once: How many chunks one task renders.
         output_key: That of the whole output.
-        note: Says in which frames nobody was found; empty if there are none.
+        note: What the user should know: of the sound, and in which frames nobody was found.
         files: What it is made from.
     """
 
@@ -152,6 +152,7 @@ def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[byt
         ChunkOutline(c.index, c.start, c.stop, piece_of(run, c), run.chunk_keys[c.index])
         for c in plan.chunks
     )
+    missing = describe_missing(plan.frames, plan.first, plan.frame_rate)
     outline = Outline(
         chunks,
         len(plan.frames),
@@ -160,7 +161,7 @@ def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[byt
         # a thread that draws for itself would gain nothing from a second chunk
         CHUNKS_AT_ONCE if recipe.occupies != "nothing" else 1,
         output_key(run),
-        describe_missing(plan.frames, plan.first, plan.frame_rate),
+        "; ".join(filter(None, [*(run.audio.notes if run.audio else ()), missing])),
         run.inputs.keys(),
     )
     return pickle.dumps(run, PICKLE_PROTOCOL), outline

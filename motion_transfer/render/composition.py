@@ -161,22 +161,24 @@ def prepare_run(
     working_size = recipe.working_size(plan.largest_side)
     canvas = make_canvas(options, scan.height, scan.width, working_size, source)
     _check_size(options, output_format, canvas)
+    audio = choose_audio(
+        options.audio,
+        options.output,
+        output_format,
+        track=options.audio_track,
+        driver=options.driver,
+        start_seconds=scan.start_seconds + plan.first / (scan.frame_rate or plan.frame_rate),
+        duration_seconds=len(plan.frames) / plan.frame_rate,
+    )
+    for note in audio.notes if audio else ():
+        listener(Notice(note))
     prepared = Prepared(
         driver=scan.file,
         plan=plan,
         recipe=recipe,
         canvas=canvas,
         output_format=output_format,
-        audio=choose_audio(
-            options.audio,
-            options.output,
-            output_format,
-            listener,
-            track=options.audio_track,
-            driver=options.driver,
-            start_seconds=scan.start_seconds + plan.first / (scan.frame_rate or plan.frame_rate),
-            duration_seconds=len(plan.frames) / plan.frame_rate,
-        ),
+        audio=audio,
         chunk_keys=tuple(chunk_key(key, plan, chunk) for chunk in plan.chunks),
         inputs=inputs,
     )

@@ -32,6 +32,9 @@ LOSSLESS_REMEDY = (
     "store the IUV as PNG frames, or with `ffmpeg -i ... -c:v ffv1 -pix_fmt bgr0 out.mkv`"
 )
 
+CAREFUL = {"err_detect": "crccheck+explode"}
+"""For decoders that look at checksums only if they are told to, such as PNG's."""
+
 
 class VideoStream(IuvStream):
     """A lossless RGB video. Raises: IuvFileError for a lossy codec or a YUV pixel format."""
@@ -73,6 +76,7 @@ class VideoStream(IuvStream):
         try:
             with open_input(self.path, "driver") as container:
                 stream = find_pictures(container, f"driver {self.path}")
+                stream.codec_context.options |= CAREFUL
                 stream.codec_context.thread_count = 1  # chunks are read in parallel already
                 wanted = self._timestamps[start:stop]
                 container.seek(wanted[0], stream=stream, backward=True)

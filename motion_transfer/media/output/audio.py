@@ -7,7 +7,7 @@ missing, there is silence, and what follows is not moved to the front.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
@@ -23,7 +23,6 @@ from av.stream import Disposition
 from jaxtyping import Float32
 
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.events import Listener, Notice, ignore
 from motion_transfer.media.container import open_input
 from motion_transfer.media.iuv.formats import find_iuv_format
 from motion_transfer.media.output.formats import OutputFormat
@@ -56,19 +55,20 @@ class AudioCut:
     Attributes:
         start_seconds: Where it begins on the file's clock.
         track: Which of the file's tracks it is of; 0 is the first.
+        notes: What the user should know of it, in sentences.
     """
 
     path: Path
     start_seconds: Fraction
     duration_seconds: Fraction
     track: int = 0
+    notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 def choose_audio(
     wish: Path | None,
     output: Path,
     output_format: OutputFormat,
-    listener: Listener = ignore,
     *,
     track: int | None = None,
     driver: Path,
@@ -81,7 +81,6 @@ def choose_audio(
 
     Args:
         wish: A file, `none`, or None for the driver's own sound where it has one.
-        listener: Hears which of several tracks is taken, if none was chosen.
         track: Which track, 0 first; None for the one that the file marks as its default.
         start_seconds: Where the output begins on the driver's clock.
     Raises: InputError for a file or a track that has no sound, or whose sound cannot be decoded;
@@ -112,7 +111,7 @@ def choose_audio(
                 if wish is None and track is None:
                     return None
                 raise InputError(f"{what} has no sound in it; {remedy}")
-            chosen = _choose_track(container, what, track, listener)
+            chosen, notes = _choose_track(container, what, track)
     except FFmpegError as error:
         raise InputError(f"{what} cannot be read: {error.strerror}; {remedy}") from error
     cut = AudioCut(path, begins if wish else start_seconds, duration_seconds, chosen)
@@ -120,38 +119,35 @@ def choose_audio(
     if sum(1 for _ in _read_cut(cut, holes.append)):
         if holes:
             missing = float(sum(hole.seconds for hole in holes))
-            listener(
-                Notice(
-                    f"the sound of {path} has holes, {missing:.2f} s in all, the first one"
-                    f" {float(holes[0].begins_seconds):.2f} s into the output; they are silent"
-                )
+            notes += (
+                f"the sound of {path} has holes, {missing:.2f} s in all, the first one"
+                f" {float(holes[0].begins_seconds):.2f} s into the output; they are silent",
             )
-        return cut
+        return replace(cut, notes=notes)
     if wish is None and track is None:
         return None
     raise InputError(f"{what} has no sound in its track {chosen}; {remedy}")
 
 
 def _choose_track(
-    container: InputContainer, what: str, wish: int | None, listener: Listener
-) -> int:
-    """Choose a track: the one wished for, else the file's default, else the first."""
+    container: InputContainer, what: str, wish: int | None
+) -> tuple[int, tuple[str, ...]]:
+    """Choose a track: the one wished for, else the file's default, else the first.
+
+    Returns: The track, and notes, if it was one of several that nobody chose.
+    """
     tracks = container.streams.audio
     listed = ", ".join(_describe(number, track) for number, track in enumerate(tracks))
     if wish is not None:
         if not 0 <= wish < len(tracks):
             raise InputError(f"--audio-track {wish}: {what} has the tracks {listed}; choose one")
-        return wish
+        return wish, ()
     defaults = (n for n, track in enumerate(tracks) if track.disposition & Disposition.default)
     chosen = next(defaults, 0)
-    if len(tracks) > 1:
-        listener(
-            Notice(
-                f"{what} has the sound tracks {listed}; {chosen} is taken, --audio-track chooses"
-                " another"
-            )
-        )
-    return chosen
+    if len(tracks) == 1:
+        return chosen, ()
+    note = f"{what} has the sound tracks {listed}; {chosen} is taken, --audio-track takes another"
+    return chosen, (note,)
 
 
 def _describe(number: int, track: av.AudioStream) -> str:

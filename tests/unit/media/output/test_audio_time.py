@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.events import Event, Notice
 from motion_transfer.media.container import open_input, open_output
 from motion_transfer.media.iuv.opening import open_stream
 from motion_transfer.media.output.audio import AudioCut, AudioTrack, choose_audio
@@ -89,10 +88,15 @@ def listen(cut: AudioCut, folder: Path) -> np.ndarray:
     return np.concatenate(frames, 1)[0].astype(float) / 32767
 
 
-def heard(
-    path: Path, *, start: float = 0, seconds: float = 2, wish: Path | None = None, **more
-) -> np.ndarray:
-    """What is heard of a driver's sound, or of a file's."""
+def choose(
+    path: Path,
+    *,
+    start: float = 0,
+    seconds: float = 2,
+    wish: Path | None = None,
+    track: int | None = None,
+) -> AudioCut:
+    """A driver's sound, or a file's."""
     cut = choose_audio(
         wish,
         Path("a.mp4"),
@@ -100,10 +104,14 @@ def heard(
         driver=path,
         start_seconds=Fraction(start).limit_denominator(1000),
         duration_seconds=Fraction(seconds).limit_denominator(1000),
-        **more,
+        track=track,
     )
     assert cut is not None
-    return listen(cut, path.parent)
+    return cut
+
+
+def heard(path: Path, **options) -> np.ndarray:
+    return listen(choose(path, **options), path.parent)
 
 
 def click_ms(samples: np.ndarray) -> float:
@@ -135,11 +143,10 @@ def test_sound_that_starts_late_stays_late(tmp_path: Path, suffix: str, start: f
 @pytest.mark.parametrize("start", [0, 0.5])
 def test_a_hole_is_silent_and_nothing_moves(tmp_path: Path, start: float) -> None:
     pieces = [(0, signal(0.5)), (1, signal(1, 0.25))]
-    told: list[Event] = []
-    path = record(tmp_path / "a.mkv", pieces)
-    samples = heard(path, start=start, seconds=2 - start, listener=told.append)
-    if start < 0.5:  # else it is where the sound begins
-        assert "holes, 0.50 s in all, the first one 0.50 s into" in str(told)
+    cut = choose(record(tmp_path / "a.mkv", pieces), start=start, seconds=2 - start)
+    samples = listen(cut, tmp_path)
+    told = "holes, 0.50 s in all, the first one 0.50 s into" in " ".join(cut.notes)
+    assert told == (start == 0)  # else it is where the sound begins
     assert len(samples) == (2 - start) * RATE
     assert click_ms(samples) == pytest.approx(1250 - 1000 * start, abs=0.6)
     hole = samples[round((0.502 - start) * RATE) : round((0.998 - start) * RATE)]
@@ -250,16 +257,15 @@ def write_tracks(path: Path, defaults: Sequence[bool]) -> Path:
 )
 def test_which_track(tmp_path: Path, defaults, wish: int | None, level: float) -> None:
     path = write_tracks(tmp_path / "a.mkv", defaults)
-    told: list[Event] = []
-    samples = heard(path, seconds=1, track=wish, listener=told.append)
+    cut = choose(path, seconds=1, track=wish)
+    samples = listen(cut, tmp_path)
     assert np.abs(samples).max() == pytest.approx(level, abs=0.01)
-    (note,) = told if wish is None else [None]
-    if isinstance(note, Notice):
-        assert "0 (eng), 1 (deu, Kommentar), 2 (fra); " in note.message
-        assert f"; {round(level * 10) - 1} is taken" in note.message
-    assert np.array_equal(
-        samples, heard(tmp_path, wish=path, seconds=1, track=wish, listener=told.append)
-    )
+    if wish is None:
+        assert "0 (eng), 1 (deu, Kommentar), 2 (fra); " in cut.notes[0]
+        assert f"; {round(level * 10) - 1} is taken" in cut.notes[0]
+    else:
+        assert cut.notes == ()
+    assert np.array_equal(samples, heard(tmp_path, wish=path, seconds=1, track=wish))
 
 
 def test_tracks_that_cannot_be(tmp_path: Path) -> None:
