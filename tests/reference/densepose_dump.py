@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import pickle
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import cv2
 import numpy as np
 import torch
 
@@ -46,6 +49,44 @@ def photo(frame: np.ndarray, name: str, *, left: float = 0.0) -> dict:
     }
 
 
+def array_photo(frame: np.ndarray, name: str) -> dict:
+    """The same photo with NumPy's arrays in place of tensors."""
+    made = photo(frame, name)
+    (shown,) = made["pred_densepose"]
+    return {
+        "file_name": name,
+        "scores": made["scores"].numpy(),
+        "pred_boxes_XYXY": made["pred_boxes_XYXY"].numpy(),
+        "pred_densepose": [result(labels=shown.labels.numpy(), uv=shown.uv.numpy())],
+    }
+
+
+def photo_of_2020(frame: np.ndarray, name: str) -> dict:
+    """The same photo as detectron2 dumped it until the middle of 2020: people as PNG."""
+    made = photo(frame, name)
+    left, top, right, bottom = made["pred_boxes_XYXY"][0].tolist()
+    held = result_class("DensePoseResult", "densepose.structures")()
+    vars(held).update(
+        boxes_xywh=[[left, top, right - left, bottom - top]],
+        results=[((3, *frame.shape[:2]), compress(frame))],
+    )
+    return {**made, "pred_densepose": held}
+
+
+def compress(frame: np.ndarray) -> str:
+    """Base64 of a PNG whose RGB is (I, U, V)."""
+    ok, png = cv2.imencode(".png", frame[..., ::-1])
+    assert ok
+    return base64.encodebytes(png.tobytes()).decode()
+
+
+def save_pickle(path: Path, held: Any, protocol: int) -> Path:
+    """`pickle.dump`, with DensePose's classes importable while it works."""
+    with _importable():
+        path.write_bytes(pickle.dumps(held, protocol))
+    return path
+
+
 def save(path: Path, held: Any, *, zipped: bool = True) -> Path:
     """`torch.save`, with DensePose's classes importable while it works."""
     with _importable():
@@ -60,6 +101,8 @@ def _importable() -> Iterator[None]:
     for name in ("", "Quantized", "Compressed"):
         kind = result_class(f"DensePoseChartResult{name}")
         setattr(modules[MODULE], kind.__name__, kind)
+    old = result_class("DensePoseResult", "densepose.structures")
+    modules["densepose.structures"].DensePoseResult = old  # pyright: ignore
     sys.modules.update(modules)
     try:
         yield
