@@ -9,6 +9,7 @@ that help is instant.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
@@ -32,6 +33,9 @@ Kind = Literal[
     "garments",
 ]
 Options = TypeVar("Options")
+
+LONGEST_SHOWN = 60  # characters of what a message repeats
+LONGEST_NUMBER = 60  # characters: more digits than any machine works with
 
 LONGEST_RATE_TERM = 2**31 - 1
 """FFmpeg's fractions (AVRational) hold no larger numerator or denominator."""
@@ -187,11 +191,13 @@ def parse_range(text: str, what: str) -> tuple[int | None, int | None]:
     """
     try:
         if ":" not in text:
-            return int(text), int(text) + 1
+            return read_whole(text), read_whole(text) + 1
         start, stop = text.split(":")
-        ends = int(start) if start else None, int(stop) if stop else None
+        ends = read_whole(start) if start else None, read_whole(stop) if stop else None
     except ValueError:
-        raise InputError(f"{what} {text!r}; write START:STOP, such as 10:50, 10: or :50") from None
+        raise InputError(
+            f"{what} {text[:LONGEST_SHOWN]!r}; write START:STOP, such as 10:50, 10: or :50"
+        ) from None
     if any(end is not None and end < 0 for end in ends):
         raise InputError(f"{what} {text!r}; {what} count from 0 and never from the end")
     return ends
@@ -205,10 +211,10 @@ def parse_frames(text: str | int) -> tuple[int | None, int | None]:
 def parse_rate(text: str | float) -> Fraction:
     """Read a rate in frames per second: `25`, `29.97` or `30000/1001`. Raises: InputError."""
     try:
-        rate = Fraction(str(text))
+        rate = read_fraction(str(text))
     except (ValueError, ZeroDivisionError):
         raise InputError(
-            f"fps {str(text)!r}; write a number or a fraction, such as 30000/1001"
+            f"fps {str(text)[:LONGEST_SHOWN]!r}; write a number or a fraction, such as 30000/1001"
         ) from None
     if not 0 < rate <= 1000:
         raise InputError(f"fps {str(text)!r}; it must lie between 0 and 1000")
@@ -222,9 +228,35 @@ def parse_rate(text: str | float) -> Fraction:
 def parse_size(text: str) -> tuple[int, int]:
     """Read `384x512` as (width, height). Raises: InputError."""
     width, _, height = text.lower().partition("x")
-    if not (width.isdecimal() and height.isdecimal()):
-        raise InputError(f"size {text!r}; write WIDTHxHEIGHT, such as 256x256")
-    return int(width), int(height)
+    try:
+        size = read_whole(width), read_whole(height)
+    except ValueError:
+        size = -1, -1
+    if min(size) < 0:
+        raise InputError(f"size {text[:LONGEST_SHOWN]!r}; write WIDTHxHEIGHT, such as 256x256")
+    return size
+
+
+def read_whole(text: str) -> int:
+    """Read a whole number as people write one: up to nine of our digits, and a sign.
+
+    Raises: ValueError for anything else that int() takes, and for what it chokes on.
+    """
+    if not re.fullmatch("-?[0-9]{1,9}", text.strip()):
+        raise ValueError(f"{text[:LONGEST_SHOWN]!r} is no whole number that can be used")
+    return int(text)
+
+
+def read_fraction(text: str) -> Fraction:
+    """Read a number exactly, a decimal or a fraction.
+
+    Raises: ValueError, ZeroDivisionError. `Fraction` would compute 1e999999999 for hours.
+    """
+    if len(text) > LONGEST_NUMBER or not all(
+        1e-30 < abs(float(term)) < 1e30 or set(term) <= set("+-.0") for term in text.split("/")
+    ):
+        raise ValueError(f"{text[:LONGEST_SHOWN]!r} is no number that can be used")
+    return Fraction(text)
 
 
 def _unchanged(value: Any) -> Any:

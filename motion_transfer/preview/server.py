@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import secrets
 import socket
 import threading
@@ -18,7 +19,6 @@ from concurrent.futures import CancelledError, Future
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
@@ -31,13 +31,16 @@ from starlette.routing import Mount, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from motion_transfer.errors import InputError, MotionTransferError, OutputError
+from motion_transfer.media.structured import parse_json
+from motion_transfer.option import read_whole
 from motion_transfer.preview.queue import StaleError
 
 if TYPE_CHECKING:
     from motion_transfer.preview.session import Session
 
 HOST = "127.0.0.1"
-LOCAL_NAMES = (HOST, "localhost", "::1")
+LOCAL_HOST = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:[0-9]{1,5})?", re.IGNORECASE)
+ONE_RANGE = re.compile(r"bytes=([0-9]{1,15}-[0-9]{0,15}|-[0-9]{1,15})")
 MOST_BODY_BYTES = 64 * 1024  # a handful of options
 STATE_SECONDS = 0.1  # between two looks for changes
 PATIENCE_SECONDS = 0.1  # between two looks whether somebody still waits for a picture
@@ -102,31 +105,26 @@ class Guard:
         """Give status and reason for what is not allowed."""
         headers = Headers(scope=scope)
         host = headers.get("host", "")
-        if _name_of(f"http://{host}") not in LOCAL_NAMES:
+        # the whole of it, and said once: a URL's parser would find our name in evil@127.0.0.1, too
+        if len(headers.getlist("host")) != 1 or not LOCAL_HOST.fullmatch(host):
             return 403, "this page is only for the machine that it runs on"
-        origin = headers.get("origin")
-        if origin is not None and origin != f"http://{host}":
+        if any(origin != f"http://{host}" for origin in headers.getlist("origin")):
             return 403, "another page asked for this"
         token = scope["path"].lstrip("/").split("/", 1)[0]
         # whose time does not tell how much of a guess was right
-        if not secrets.compare_digest(token.encode(), self._token.encode()):
+        if not secrets.compare_digest(token.encode("utf-8", "replace"), self._token.encode()):
             return 404, "nothing here; open the link that mt preview printed"
+        if not all(ONE_RANGE.fullmatch(each) for each in headers.getlist("range")):
+            return 416, "only one range of bytes is sent at once"
         if scope["method"] == "POST":
             # no form of another page can send this type without asking first
             if headers.get("content-type", "").split(";")[0].strip() != "application/json":
                 return 415, "the body has to be application/json"
             length = headers.get("content-length", "")
-            if not length.isdigit():
+            if not re.fullmatch("[0-9]+", length):
                 return 411, "the length of the body has to be told"
-            if int(length) > MOST_BODY_BYTES:
+            if len(length) > 9 or int(length) > MOST_BODY_BYTES:
                 return 413, f"the body is larger than {MOST_BODY_BYTES} bytes"
-        return None
-
-
-def _name_of(url: str) -> str | None:
-    try:
-        return urlsplit(url).hostname
-    except ValueError:
         return None
 
 
@@ -195,7 +193,7 @@ def make_app(session: Future[Session], token: str, closing: Callable[[], bool]) 
     routes = [
         Route("/", handlers.page),
         Route("/events", handlers.events),
-        Route("/frame/{index:int}/{view}", handlers.frame),
+        Route("/frame/{index}/{view}", handlers.frame),
         Route("/still/{view}", handlers.still),
         Route("/options", handlers.options, methods=["POST"]),
         Route("/render", handlers.render, methods=["POST"]),
@@ -253,7 +251,11 @@ class _Handlers:
 
     async def frame(self, request: Request) -> Response:
         """Send a view of one frame; it is not drawn if nobody waits for it any more."""
-        index, view = request.path_params["index"], request.path_params["view"]
+        try:
+            index = read_whole(request.path_params["index"])
+        except ValueError:
+            raise HTTPException(404, "there is no such frame") from None
+        view = request.path_params["view"]
         key, draft = request.query_params.get("key", ""), request.query_params.get("draft") == "1"
         future = (await self._session()).ask_frame(index, view, key, draft=draft)
         return await self._picture(request, future)
@@ -346,9 +348,10 @@ def _window_words(value: Any) -> str:
 async def _body(request: Request) -> dict[str, Any]:
     """Read a body, whose size was checked before. Raises: InputError for any but a mapping."""
     try:
-        body = await request.json()
-    except ValueError:
-        raise InputError("the body is not JSON") from None
+        text = (await request.body()).decode()
+    except UnicodeDecodeError:
+        raise InputError("the body is not text in UTF-8") from None
+    body = parse_json(text, "the body")
     if not isinstance(body, dict):
         raise InputError("the body has to be an object")
     return body

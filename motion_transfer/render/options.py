@@ -25,7 +25,14 @@ from motion_transfer.media.iuv.formats import (
     Missing,
     driver_help,
 )
-from motion_transfer.option import REQUIRED, check_choices, option, parse_colour
+from motion_transfer.option import (
+    LONGEST_SHOWN,
+    REQUIRED,
+    check_choices,
+    option,
+    parse_colour,
+    read_whole,
+)
 
 NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
@@ -369,9 +376,11 @@ def parse_window(text: str) -> tuple[int, int, int] | None:
     if text == "auto":
         return None
     try:
-        x, y, side = (int(word) for word in text.split(","))
+        x, y, side = (read_whole(word) for word in text.split(","))
     except ValueError:
-        raise InputError(f"window {text!r}; write X,Y,SIDE in pixels, or auto") from None
+        raise InputError(
+            f"window {text[:LONGEST_SHOWN]!r}; write X,Y,SIDE in pixels, or auto"
+        ) from None
     if not SMALLEST_WINDOW <= side <= LARGEST_WINDOW:
         raise InputError(
             f"window {text!r}; its side lies between {SMALLEST_WINDOW} and {LARGEST_WINDOW} pixels"

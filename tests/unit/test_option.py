@@ -15,6 +15,8 @@ from motion_transfer.option import (
     list_options,
     option,
     options_from_words,
+    parse_frames,
+    parse_rate,
     parse_size,
     part_of,
 )
@@ -59,7 +61,30 @@ def test_parts_are_equal_where_what_they_hold_is() -> None:
     assert part_of(one, Ends) == part_of(other, Ends) == Ends(first=Path("a"))
 
 
-@pytest.mark.parametrize("text", ["", "256", "256x", "axb", "-1x5", "1.5x2"])
+@pytest.mark.parametrize(
+    "text", ["", "256", "256x", "axb", "-1x5", "1.5x2", "³x5", f"{'9' * 5000}x5"]
+)
 def test_bad_sizes(text: str) -> None:
     with pytest.raises(InputError, match="write WIDTHxHEIGHT"):
         parse_size(text)
+
+
+@pytest.mark.parametrize("text", ["1e999999999", "1e-999999999", "9" * 5000, "nan", "inf", "³", ""])
+def test_rates_that_no_video_has(text: str) -> None:
+    with pytest.raises(InputError, match="fps") as caught:
+        parse_rate(text)
+    assert len(str(caught.value)) < 150
+
+
+def test_rates_are_exact() -> None:
+    rates = ("30000/1001", "29.97", "2.5e1", 25)
+    assert [parse_rate(rate) for rate in rates] == [
+        *(Fraction(30000, 1001), Fraction(2997, 100)),
+        *(Fraction(25), Fraction(25)),
+    ]
+
+
+@pytest.mark.parametrize("text", ["9" * 5000 + ":", "1_0:", "³:", "1:2:3", "a"])
+def test_frames_that_no_driver_has(text: str) -> None:
+    with pytest.raises(InputError, match="write START:STOP"):
+        parse_frames(text)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
+from concurrent.futures import Future
+from typing import Any
 
 import pytest
 
 pytest.importorskip("starlette", reason="needs the `preview` extra")
 
-from motion_transfer.preview.server import MOST_BODY_BYTES, Guard
+from starlette.testclient import TestClient
+
+from motion_transfer.preview.server import MOST_BODY_BYTES, Guard, make_app
 
 TOKEN = "secret"
 
@@ -49,7 +53,12 @@ def test_this_machine_is_let_in_through_any_port(host: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "host", ["evil.example", "127.0.0.1.evil.example:8000", "", "0.0.0.0:8000", "[", "a@b"]
+    "host",
+    [
+        *("evil.example", "127.0.0.1.evil.example:8000", "", "0.0.0.0:8000", "[", "a@b"),
+        *("evil.com@127.0.0.1", "127.0.0.1/evil", "127.0.0.1#evil.com", "127.0.0.1?x", "[::1"),
+        *("127.0.0.1:", "127.0.0.1:8000:1", "127.0.0.1:x", "127.0.0.1:³", "127.0.0.1 ", "::1"),
+    ],
 )
 def test_other_names_are_refused(host: str) -> None:
     status, _, body = ask(host=host)
@@ -107,3 +116,61 @@ def test_every_answer_has_strict_headers(path: str) -> None:
 
 def test_refusals_are_in_words() -> None:
     assert "open the link" in json.loads(ask("/x")[2])["error"]
+
+
+@pytest.mark.parametrize("length", ["", "³", "-1", "1e3", "9" * 5000])
+def test_lengths_that_are_none(length: str) -> None:
+    status = ask(method="POST", content_type="application/json", content_length=length)[0]
+    assert status == (413 if length.startswith("9") else 411)
+
+
+@pytest.mark.parametrize("bounds", ["bytes=-", f"bytes={'9' * 5000}-", "bytes=0-1,2-3", "lines=1"])
+def test_ranges_that_are_none(bounds: str) -> None:
+    assert ask(range=bounds)[0] == 416
+    assert ask(range="bytes=0-")[0] == ask(range="bytes=-5")[0] == 200
+
+
+class Idle:
+    """A session that takes whatever it is asked."""
+
+    revision = 0
+
+    def change(self, texts: dict[str, str]) -> None:
+        self.texts = texts
+
+    def state(self) -> dict[str, int]:
+        return {"revision": 0}
+
+    def ask_frame(self, index: int, *_: object, **__: object) -> Future[bytes]:
+        future: Future[bytes] = Future()
+        future.set_result(str(index).encode())
+        return future
+
+
+def client() -> TestClient:
+    session: Future[Any] = Future()
+    session.set_result(Idle())
+    app = Guard(make_app(session, TOKEN, lambda: True), TOKEN)
+    return TestClient(app, base_url="http://127.0.0.1:8000", raise_server_exceptions=False)
+
+
+def test_frames_are_known_by_numbers() -> None:
+    assert client().get(f"/{TOKEN}/frame/12/result").content == b"12"
+    for index in ("9" * 5000, "³", "1_0", "x", "%00"):
+        answer = client().get(f"/{TOKEN}/frame/{index}/result")
+        assert (answer.status_code, list(answer.json())) == (404, ["error"])
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        *(b"", b"[", b"[" * 50000, b"1" * 5000, b"\xff", b"null", b"[]", b"NaN", b'{"a": NaN}'),
+        *(b'{"a": []}', b'{"a": {}}', b'{"a": null}', b'{"a": "\\u0000"}', b'{"a": "\\ud800"}'),
+        *(b'{"a": 1, "a": 2}', b'{"a": ' + b"9" * 5000 + b"}", b'{"a": ' + b'{"a":' * 9000),
+    ],
+)
+def test_bodies_that_are_no_options(body: bytes) -> None:
+    answer = client().post(
+        f"/{TOKEN}/options", content=body, headers={"content-type": "application/json"}
+    )
+    assert (answer.status_code, "error" in answer.json()) == (422, True)
