@@ -5,7 +5,8 @@ mean content that did not change. Where they did, the content itself decides, so
 was only touched, or copied over itself, stops nobody.
 """
 
-# ruff: noqa: PTH (to make tens of thousands of `Path` takes longer than to look at the files)
+# to make tens of thousands of `Path` takes longer than to look at the files
+# ruff: noqa: PTH116, PTH118, PTH119, PTH122, PTH123, PTH208
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ GLANCE_SHARE = 0.02
 
 FRAME_SUFFIXES = {
     *(".png", ".apng", ".bmp", ".tif", ".tiff", ".npy", ".npz"),
-    *(".jpg", ".jpeg", ".webp", ".avif"),
+    *(".jpg", ".jpeg", ".webp", ".avif", ".heic", ".heif", ".hif"),
 }
 """Endings of what folders of frames are made of, in any of the tables of formats, which lie above
 this module."""
@@ -88,9 +89,10 @@ class Inputs:
                     raise _changed(file, "been removed")
                 if now == status and status is not None:
                     continue
-                known[file] = _know(file)
-                if known[file].digest != digest:
+                again = _know(file)
+                if again.digest != digest:
                     raise _changed(file, "changed")
+                known[file] = again
 
     def glance(self) -> None:
         """As `check`, for calling often: it takes a small share of the time at most."""

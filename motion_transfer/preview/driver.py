@@ -97,6 +97,7 @@ class PreviewedDriver:
 
         Args:
             done: Called as frames were looked at, with their number.
+        Raises: InputError if the driver has changed meanwhile.
         """
         for start in range(0, self.frame_count, BLOCK_FRAMES):
             block = range(start, min(start + BLOCK_FRAMES, self.frame_count))
@@ -109,6 +110,7 @@ class PreviewedDriver:
             except InputError:  # one of them: the others can be read one by one
                 self.see(block)
             done(len(block))
+        self.opened.inputs.check()
 
     def _note(self, index: int, iuv: UInt8[np.ndarray, "H W 3"]) -> None:
         people = self.opened.people_in(iuv)

@@ -22,6 +22,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.events import Event, FramesDone, Notice, Stage
 from motion_transfer.media.pictures.photo import encode_jpeg, encode_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
+from motion_transfer.media.unchanged import Inputs
 from motion_transfer.option import list_options
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.preview.export import command_line, manifest_text
@@ -30,6 +31,7 @@ from motion_transfer.preview.rendering import Rendering, explain
 from motion_transfer.preview.views import Views, count_people, read_proxy, write_proxies
 from motion_transfer.render.composition import frame_size
 from motion_transfer.render.driver import open_driver
+from motion_transfer.render.inputs import appearance_files
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions, parse_window
 
 CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's
@@ -59,6 +61,7 @@ class Session:
         self.source_people = 0
         self.rendering = Rendering(self._touch)
         self.views = Views()
+        self._inputs = Inputs()
         self._notices: list[str] = []
         self._errors: dict[str, str] = {}
         self._work: dict[str, Any] | None = None
@@ -124,6 +127,7 @@ class Session:
             raise InputError(f"frame {index}; the driver has {driver.frame_count}, from 0")
         if key != current:
             raise StaleError("something has changed since; ask again with the new key")
+        self._check_inputs(driver)
         draft = options.renderer == DRAFT  # asked for as one, or drawn as one anyway
         return self._ask((key, view, index, draft), calls[view], view, index, draft)
 
@@ -211,6 +215,16 @@ class Session:
                 self.source = source
                 self._errors.pop("source", None)
         self._touch()
+
+    def _check_inputs(self, driver: PreviewedDriver) -> None:
+        """Raise InputError if a file is not what it was; from then on the page says so."""
+        try:
+            self._inputs.glance()
+            driver.opened.inputs.glance()
+        except InputError as error:
+            self._errors["inputs"] = str(error)
+            self._touch()
+            raise
 
     # results
 
@@ -336,6 +350,7 @@ class Session:
 
     def _find_source(self) -> None:
         try:
+            self._inputs = Inputs(appearance_files(self.options))
             self.source = self.views.source(draft_of(self.options))
             self.source_people = count_people(self.source, self.options)
             self._notices += [note for note in self.source.notes if note not in self._notices]

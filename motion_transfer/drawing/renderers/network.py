@@ -24,7 +24,7 @@ from motion_transfer.drawing.person import disc, occupancy
 from motion_transfer.drawing.renderers.interface import Appearance, Occupied
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import SIDE_STEP, drawn_side
-from motion_transfer.errors import InputError
+from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.weights.checkpoint import digest_weights, inspect_checkpoint, load_checkpoint
 from nhrr_core import FastRenderNet, NeuralReRenderer, RenderNet
 
@@ -101,9 +101,14 @@ def open_recipe(weights: Path) -> NetworkRecipe:
 
 
 @lru_cache(maxsize=KEPT_NETWORKS)
-def _open_model(weights: Path, _digest: str) -> NeuralReRenderer:
-    """Load a checkpoint; a file that has changed meanwhile has another digest."""
-    return load_checkpoint(weights).to("cuda" if torch.cuda.is_available() else "cpu")
+def _open_model(weights: Path, digest: str) -> NeuralReRenderer:
+    """Load a checkpoint. Raises: WeightsError if its digest is another by now."""
+    model = load_checkpoint(weights)
+    if digest_weights(weights) != digest:
+        raise WeightsError(
+            f"weights {weights} have changed since the run began; start again when they are whole"
+        )
+    return model.to("cuda" if torch.cuda.is_available() else "cpu")
 
 
 @lru_cache(maxsize=KEPT_NETWORKS)
