@@ -19,10 +19,11 @@ from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.extras import require_extra
+from motion_transfer.media.files import check_readable
 from motion_transfer.media.iuv.stream import IuvStream, Raw
 from motion_transfer.media.iuv.writing import IuvOutput, write_iuv
 from motion_transfer.media.publish import check_destination
-from motion_transfer.option import parse_size
+from motion_transfer.option import parse_rate, parse_size, read_whole
 from motion_transfer.people.figure.body import Body, BodyModel, Shape, load_body_model
 from motion_transfer.people.figure.camera import (
     FRAMINGS,
@@ -43,6 +44,8 @@ PosedAt = Callable[[int], PosedBody]
 LONGEST_SIDE = 4096
 """Pixels; chosen as a bound against slips of the pen."""
 
+MOST_FRAMES = 1_000_000  # nine hours
+
 CAMERA_POSES = 48
 """Instants of a motion that the camera is made to hold; between them a body moves little."""
 
@@ -50,8 +53,8 @@ CAMERA_STEP = 8
 """One in so many vertices is enough to point a camera by."""
 
 SETTINGS: dict[str, tuple[str, Callable[[str], Any]]] = {
-    "frames": ("frame_count", int),
-    "fps": ("frame_rate", Fraction),
+    "frames": ("frame_count", read_whole),
+    "fps": ("frame_rate", parse_rate),
     "size": ("size", parse_size),
     "framing": ("framing", str),
     "azimuth": ("azimuth", float),
@@ -91,11 +94,15 @@ class MotionOptions:
     def __post_init__(self) -> None:
         if self.frame_count is not None and self.frame_count < 1:
             raise InputError(f"frames is {self.frame_count}; a driver needs at least 1")
+        if self.frame_count is not None and self.frame_count > MOST_FRAMES:
+            raise InputError(f"frames is {self.frame_count}; a driver has {MOST_FRAMES:,} at most")
         check_size(self.size, 16, LONGEST_SIDE)
         if self.framing not in FRAMINGS:
             raise InputError(f"framing {self.framing!r}; supported are {', '.join(FRAMINGS)}")
         if not 1 <= self.distance <= 100:
             raise InputError(f"distance is {self.distance} m; it must lie in 1..100")
+        if not -360 <= self.azimuth <= 360:
+            raise InputError(f"azimuth is {self.azimuth} degrees; it must lie in -360..360")
         if not -80 <= self.elevation <= 80:
             raise InputError(f"elevation is {self.elevation} degrees; it must lie in -80..80")
         for name in (entry.name for entry in fields(self.shape)):
@@ -145,8 +152,7 @@ def check_motion(name: str) -> None:
         return
     if Path(name).suffix.lower() != ".bvh":
         raise InputError(f"unknown motion {name!r}; supported are {', '.join(MOTIONS)}, FILE.bvh")
-    if not Path(name).is_file():
-        raise InputError(f"motion {name} does not exist")
+    check_readable(Path(name), "motion")
 
 
 def _named_motion(options: MotionOptions, body: Body, model: BodyModel) -> tuple[int, PosedAt]:
@@ -161,6 +167,8 @@ def _captured_motion(options: MotionOptions, body: Body, model: BodyModel) -> tu
     captured = read_bvh(Path(options.motion))
     seconds = len(captured.frames) / captured.frame_rate
     count = options.frame_count or max(1, round(seconds * options.frame_rate))
+    if count > MOST_FRAMES:
+        raise InputError(f"{options.motion} lasts {count} frames; {MOST_FRAMES:,} at most are made")
     poses = bvh_poses(captured, body, travel=options.travel)
     poses = poses.resampled(count, options.frame_rate)
     return count, lambda index: moved(body, *poses[index], model)

@@ -9,8 +9,6 @@ used, so that help is instant.
 from __future__ import annotations
 
 import json
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
@@ -324,25 +322,24 @@ class TrainConfig:
 def read_settings(path: Path) -> dict[str, Any]:
     """Read the keys of a `train.toml` as `section.key`, all of them known.
 
-    Raises: InputError naming file, line of the section and key.
+    Raises: InputError naming file, line, section and key.
     """
-    from motion_transfer.media.files import read_bytes
+    from motion_transfer.media.structured import parse_structured, read_text, shown_name
 
-    try:
-        text = read_bytes(path, "configuration").decode()
-        tables = tomllib.loads(text)
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"configuration {path} is not TOML: {error}") from error
+    where = f"configuration {path}"
+    text = parse_structured(read_text(path, "configuration"), ".toml", where)
     settings = {}
-    for section, table in tables.items():
-        where = f"configuration {path}{_line_of(text, section)}"
+    for section, table in text.data.items():
+        name = shown_name(section)
         if not isinstance(table, dict):
-            raise InputError(f"{where}: {section} stands outside a section")
+            line = text.line((section,))
+            raise InputError(f"{where}, line {line}: {name} stands outside a section")
         for key, value in table.items():
             try:
                 settings[f"{section}.{key}"] = check_value(f"{section}.{key}", value)
             except InputError as error:
-                raise InputError(f"{where}, [{section}]: {error}") from error
+                line = text.line((section, key) if section in SECTIONS else (section,))
+                raise InputError(f"{where}, line {line}, [{name}]: {error}") from error
     return settings
 
 
@@ -351,12 +348,14 @@ def parse_assignment(text: str) -> tuple[str, Any]:
 
     Raises: InputError.
     """
+    from motion_transfer.media.structured import parse_structured
+
     name, equals, word = text.partition("=")
     if not equals:
         raise InputError(f"{text!r} sets nothing; write section.key=value")
     try:
-        value = tomllib.loads(f"value = {word}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = parse_structured(f"value = {word}", ".toml", name).data["value"]
+    except InputError:
         value = word
     return name.strip(), check_value(name.strip(), value)
 
@@ -366,17 +365,19 @@ def check_value(name: str, value: Any) -> Any:
 
     Raises: InputError naming section and key, the value, and what it must be.
     """
+    from motion_transfer.media.structured import shown
+
     section, _, key = name.partition(".")
     if section not in SECTIONS:
-        raise InputError(f"unknown section {section!r}; there are {', '.join(SECTIONS)}")
+        raise InputError(f"unknown section {shown(section)}; there are {', '.join(SECTIONS)}")
     kinds = _kinds(section)
     if key not in kinds:
-        raise InputError(f"unknown key {key!r}; [{section}] has {', '.join(kinds)}")
+        raise InputError(f"unknown key {shown(key)}; [{section}] has {', '.join(kinds)}")
     try:
         return kinds[key].validate_python(value, strict=True)
     except ValidationError as error:
         wanted = error.errors()[0]["msg"].removeprefix("Input should be ")
-        raise InputError(f"{name} is {value!r}; it must be {wanted}") from None
+        raise InputError(f"{name} is {shown(value)}; it must be {wanted}") from None
 
 
 def build_config(settings: Mapping[str, Any], *, model: ModelConfig | None = None) -> TrainConfig:
@@ -439,15 +440,6 @@ def _kinds(section: str) -> dict[str, TypeAdapter[Any]]:
 
         hints |= get_type_hints(ModelConfig)
     return {key: TypeAdapter(hint) for key, hint in hints.items()}
-
-
-def _line_of(text: str, section: str) -> str:
-    name = rf"\"?{re.escape(section)}\"?"
-    heading_or_key = re.compile(rf"^\s*(\[\s*{name}\s*\]|{name}\s*[.=])")
-    for number, line in enumerate(text.splitlines(), start=1):
-        if heading_or_key.match(line):
-            return f", line {number}"
-    return ""
 
 
 def _toml(value: bool | int | float | str) -> str:

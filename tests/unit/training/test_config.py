@@ -65,12 +65,16 @@ def test_written_and_read_it_is_the_same(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[run]\nsteps = 5\n\n[losses]\nperceptul = 'none'\n", r"line 4, \[losses\]: unknown key"),
+        ("[run]\nsteps = 5\n\n[losses]\nperceptul = 'none'\n", r"line 5, \[losses\]: unknown key"),
         ("[lossses]\nidentity = 'none'\n", r"line 1.*unknown section 'lossses'"),
         ("steps = 5\n", "line 1: steps stands outside a section"),
         ("[run]\nsteps = '5'\n", r"run\.steps is '5'; it must be a valid integer"),
         ("[run]\nsteps = true\n", r"run\.steps is True"),
-        ("[run\n", "is not TOML"),
+        ("[run]\nsteps = " + "9" * 5000, "a whole number here has more digits"),
+        ("a = " + "[" * 20000, "lie in each other more than"),
+        ("[model]\ndown_blocks = 4611686018427387904\n", ":2: '46116860184273"),
+        ('[run]\n"" = 3\n', "unknown key ''"),
+        ("[run\n", r"Expected .* \(at line 1"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, text: str, message: str) -> None:

@@ -16,10 +16,15 @@ import numpy as np
 from jaxtyping import Float64
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.files import read_bytes
+from motion_transfer.option import read_fraction, read_whole
 from motion_transfer.people.motion.limbs import Vector
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 _SPELLING = {name.lower(): name for name in CHANNELS}
+LARGEST = 1e9  # micrometres in a kilometre: no unit of length or angle needs more
+MOST_JOINTS, DEEPEST = 1000, 100  # of a person with every finger, some 80 and 12
+SHORTEST_SECONDS, LONGEST_SECONDS = 1e-4, 100.0  # of a frame
 USUAL_RATES = (
     *(Fraction(n) for n in (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 125, 144, 150, 200, 240)),
     *(Fraction(n * 1000, 1001) for n in (24, 30, 60, 120)),
@@ -77,7 +82,7 @@ class _Reader:
     """Walks over the lines of a file and knows where it is."""
 
     path: Path
-    lines: list[list[str]]
+    lines: list[str]
     at: int = 0  # number of the line that was read last
 
     def error(self, message: str) -> InputError:
@@ -88,8 +93,8 @@ class _Reader:
         """Read the next line that is not empty. Raises: InputError at the file's end."""
         while self.at < len(self.lines):
             self.at += 1
-            if self.lines[self.at - 1]:
-                return self.lines[self.at - 1]
+            if words := self.lines[self.at - 1].split():
+                return words
         raise self.error(f"the file ends where {wanted} was expected")
 
     def numbers(self, words: list[str]) -> list[float]:
@@ -99,10 +104,20 @@ class _Reader:
             try:
                 values.append(float(word))
             except ValueError:
-                raise self.error(f"{word!r} is not a number") from None
-        if not np.isfinite(values).all():
-            raise self.error("numbers must be finite")
+                raise self.error(f"{_shown([word])} is not a number") from None
+            if not abs(values[-1]) <= LARGEST:  # NaN is no less than anything
+                raise self.error(f"{_shown([word])} is no length, angle or time of a person")
         return values
+
+    def whole(self, word: str, what: str) -> int:
+        """Read a word as a whole number, from 0. Raises: InputError."""
+        try:
+            number = read_whole(word)
+        except ValueError:
+            number = -1
+        if number < 0:
+            raise self.error(what)
+        return number
 
 
 def read_bvh(path: Path | str) -> BvhMotion:
@@ -131,11 +146,8 @@ def read_bvh(path: Path | str) -> BvhMotion:
     )
 
 
-def _lines(path: Path) -> list[list[str]]:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+def _lines(path: Path) -> list[str]:
+    data = read_bytes(path, "motion")
     if not data.strip():
         raise InputError(f"{path}, line 1: the file is empty")
     text, wrong = "", data.find(b"\0")
@@ -146,7 +158,7 @@ def _lines(path: Path) -> list[list[str]]:
     if wrong >= 0:
         line = data[:wrong].count(b"\n") + 1
         raise InputError(f"{path}, line {line}: this is not text, so not a BVH file")
-    return [line.split() for line in text.splitlines()]
+    return text.splitlines()
 
 
 def _shown(words: list[str]) -> str:
@@ -171,6 +183,10 @@ def _read_joints(reader: _Reader) -> list[_Joint]:
         elif key == "JOINT" and len(words) > 1:
             joints.append(_begin_joint(reader, words, inside[-1]))
             inside.append(len(joints) - 1)
+            if len(joints) > MOST_JOINTS or len(inside) > DEEPEST:
+                raise reader.error(
+                    f"more than {MOST_JOINTS} joints, or {DEEPEST} in each other, are no person's"
+                )
         elif key == "END":
             joint.end = _read_end_site(reader)
         elif key == "OFFSET":
@@ -207,7 +223,7 @@ def _offset(reader: _Reader, words: list[str]) -> list[float]:
 
 
 def _read_end_site(reader: _Reader) -> list[float]:
-    if reader.lines[reader.at - 1][-1] != "{":
+    if not reader.lines[reader.at - 1].rstrip().endswith("{"):
         _open_brace(reader, "the End Site")
     words = reader.words("OFFSET")
     if words[0].upper() != "OFFSET":
@@ -219,14 +235,13 @@ def _read_end_site(reader: _Reader) -> list[float]:
 
 
 def _channels(reader: _Reader, words: list[str]) -> tuple[str, ...]:
-    if len(words) < 2 or not words[1].isdigit():
-        raise reader.error("CHANNELS takes a count and that many names")
+    said = reader.whole(" ".join(words[1:2]), "CHANNELS takes a count and that many names")
     names = words[2:]
-    if int(words[1]) != len(names):
-        raise reader.error(f"CHANNELS says {words[1]}, here are {len(names)} names")
+    if said != len(names):
+        raise reader.error(f"CHANNELS says {said}, here are {len(names)} names")
     wrong = [name for name in names if name.lower() not in _SPELLING]
     if wrong:
-        raise reader.error(f"unknown channel {wrong[0]!r}; there are {', '.join(CHANNELS)}")
+        raise reader.error(f"unknown channel {_shown(wrong[:1])}; there are {', '.join(CHANNELS)}")
     spelt = tuple(_SPELLING[name.lower()] for name in names)
     if len(set(spelt)) != len(spelt):
         raise reader.error("a channel occurs twice")
@@ -241,20 +256,26 @@ def _read_motion_head(reader: _Reader) -> tuple[int, int, Fraction]:
         raise reader.error(f"{_shown(words)} instead of MOTION{brace}")
     words = reader.words("Frames:")
     label, _, rest = " ".join(words).partition(":")
-    if label.strip().lower() != "frames" or not rest.strip().isdigit():
-        raise reader.error(f"{_shown(words)} instead of Frames: and a whole number")
-    count, line = int(rest), reader.at
+    wanted = f"{_shown(words)} instead of Frames: and a whole number"
+    if label.strip().lower() != "frames":
+        raise reader.error(wanted)
+    count, line = reader.whole(rest, wanted), reader.at
     if count == 0:
         raise reader.error("there are no frames")
     words = reader.words("Frame Time:")
     label, _, rest = " ".join(words).partition(":")
     if label.lower().split() != ["frame", "time"]:
         raise reader.error(f"{_shown(words)} instead of Frame Time: and seconds")
-    reader.numbers([rest.strip()])
-    seconds = Fraction(rest.strip())
-    if seconds <= 0:
-        raise reader.error(f"the frame time is {rest.strip()} s; it must be more than 0")
-    return count, line, seconds
+    (seconds,) = reader.numbers([rest.strip()])
+    if not SHORTEST_SECONDS <= seconds <= LONGEST_SECONDS:
+        raise reader.error(
+            f"the frame time is {seconds:g} s; it must lie between {SHORTEST_SECONDS:g} and"
+            f" {LONGEST_SECONDS:g}"
+        )
+    try:
+        return count, line, read_fraction(rest.strip())
+    except ValueError:  # more digits than are of use
+        return count, line, Fraction(seconds)
 
 
 def _read_frames(reader: _Reader, width: int, count: int, promised: int) -> Iterator[list[float]]:
@@ -268,5 +289,5 @@ def _read_frames(reader: _Reader, width: int, count: int, promised: int) -> Iter
         yield reader.numbers(words)
     while reader.at < len(reader.lines):
         reader.at += 1
-        if reader.lines[reader.at - 1]:
+        if reader.lines[reader.at - 1].strip():
             raise reader.error(f"more lines than the {count} frames that line {promised} promises")

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
+from motion_transfer.errors import InputError
 from motion_transfer.people.motion.bvh.file import BvhMotion
 from motion_transfer.people.motion.bvh.skeleton import Limb, Roles, Tracks, find_roles, tracks
 from motion_transfer.people.motion.limbs import MIRROR, Matrix, Vector
@@ -20,6 +21,7 @@ Vectors = Float64[np.ndarray, "N 3"]
 Matrices = Float64[np.ndarray, "N 3 3"]
 
 PRIOR = 0.02  # weight of the assumed hinge against the squared sines of the bends that are seen
+SHORTEST_LEG = 1e-6  # in whatever unit: what is divided by
 STRAIGHT = 0.966  # cosine of 15 degrees: a leg less bent than that at rest was meant to be straight
 UPRIGHT = 0.8  # cosine of how far a rest pose may lean and still be taken for a standing one
 
@@ -59,7 +61,8 @@ class Frames:
 def body_frames(motion: BvhMotion) -> Frames:
     """Take a motion off its skeleton.
 
-    Raises: InputError where the skeleton has no hips with two legs: see `find_roles`.
+    Raises: InputError where the skeleton has no hips with two legs, see `find_roles`, or they have
+        no length.
     """
     roles = find_roles(motion)
     moving, rest = _faced(tracks(motion), tracks(motion, at_rest=True), roles)
@@ -74,7 +77,12 @@ def body_frames(motion: BvhMotion) -> Frames:
     if roles.arms is not None:
         left, right = roles.arms
         arms = _arm(motion, moving, rest, left, one), _arm(motion, moving, rest, right, MIRROR)
-    scale = 1 / _leg_length(places, roles)
+    length = _leg_length(places, roles)
+    if length < SHORTEST_LEG:
+        raise InputError(
+            f"{motion.path}: the legs of the skeleton have no length; check its OFFSETs"
+        )
+    scale = 1 / length
     return Frames(turns[:, roles.hips], turns[:, chest], turns[:, head], legs, arms, hips * scale)
 
 

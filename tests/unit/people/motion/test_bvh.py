@@ -190,7 +190,18 @@ def test_windows_line_ends_byte_order_mark_and_braces_on_the_same_line(tmp_path:
         (("0.0333333", "soon"), 18, "'soon' is not a number"),
         (("Frame Time:", "Frametime:"), 18, "instead of Frame Time:"),
         (("1 2 3 0", "1 2 x 0"), 19, "'x' is not a number"),
-        (("1 2 3 0", "1 2 nan 0"), 19, "finite"),
+        (("1 2 3 0", "1 2 nan 0"), 19, "'nan' is no length, angle or time"),
+        (("1 2 3 0", "1 2 1e300 0"), 19, "'1e300' is no length, angle or time"),
+        (("Frames: 2", "Frames: ³"), 17, "instead of Frames:"),
+        (("Frames: 2", f"Frames: {'9' * 5000}"), 17, "instead of Frames:"),
+        (("Frames: 2", "Frames: 999999999"), 20, "ends after 2 of 999999999 frames"),
+        (("0.0333333", "1e-99999999"), 18, "the frame time is 0 s; it must lie between"),
+        (("0.0333333", "1e6"), 18, "the frame time is 1e+06 s; it must lie between"),
+        (
+            ("JOINT Knee", "JOINT Knee {\nOFFSET 0 1 0\n" * 2000),
+            208,
+            "more than 1000 joints, or 100",
+        ),
         (("1 2 3 0 0 0 0 90 0", "1 2 3 0 0 0 0 90"), 19, "has 8 values, the channels are 9"),
     ],
 )
@@ -223,7 +234,7 @@ def test_what_is_not_bvh_at_all(tmp_path: Path, data: bytes, line: int, words: s
 
 
 def test_a_missing_file_is_an_input_error(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none\.bvh cannot be read"):
+    with pytest.raises(InputError, match=r"none\.bvh does not exist"):
         read_bvh(tmp_path / "none.bvh")
 
 
