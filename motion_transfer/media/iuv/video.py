@@ -25,6 +25,7 @@ from motion_transfer.media.pictures.display import (
     square_size,
     stretch_whole,
 )
+from motion_transfer.media.pictures.stream import plan_timing
 from motion_transfer.media.pictures.video import pick_frames
 
 LOSSLESS_CODECS = ("ffv1", "ffvhuff", "huffyuv", "utvideo", "png", "apng", "qtrle", "rawvideo")
@@ -69,6 +70,11 @@ class VideoStream(IuvStream):
         super().__init__(path, f"IUV video ({codec}, {pixels})", len(self._timestamps))
         self.frame_rate = Fraction(rate) if rate else None
         self.start_seconds = self._timestamps[0] * base
+        if not plan_timing(times, base, self.frame_rate, path).constant:
+            notes += (
+                f"{path} has a varying frame rate; its frames are shown evenly, at the mean, and"
+                " may drift from its sound",
+            )
         self.notes = notes
 
     def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
