@@ -6,6 +6,7 @@ import io
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
+from typing import Any, cast
 
 import numpy as np
 from PIL import Image, ImageCms
@@ -77,13 +78,14 @@ def _conversion(profile: bytes, space: str) -> Conversion:
     """Find the way from a profile to sRGB for pictures of one space. Raises: ProfileError."""
     try:
         opened = ImageCms.ImageCmsProfile(io.BytesIO(profile))
-        described = opened.profile.xcolor_space.strip()
+        facts = cast(Any, opened.profile)  # it is open: the types leave that open
+        described = facts.xcolor_space.strip()
         # grey is a colour, too: editors keep the profile of a photo that is made grey
         if described != space and (described, space) != ("RGB", "GRAY"):
             raise ProfileError(f"it is for {described}, the picture is {space}")
         mode = MODES[described]
         transform = ImageCms.buildTransform(opened, SRGB, mode, "RGB")
-        name = " ".join((opened.profile.profile_description or "").split())
+        name = " ".join((facts.profile_description or "").split())
         same = mode != "CMYK" and _is_srgb(transform, mode)
     except ProfileError:
         raise

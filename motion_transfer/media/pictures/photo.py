@@ -161,7 +161,7 @@ def decode_photo(file: Image.Image, path: Path, where: str) -> Photo:
     with quiet_libraries() if file.format == "TIFF" else nullcontext():
         file.load()  # turns a TIFF, and then says that it is upright
     image = _with_8_bits(file)
-    if turn := TURNS.get(_orientation(file)):
+    if turn := TURNS.get(_orientation(file) or 1):
         image = image.transpose(turn)
     alpha = image.convert("RGBA").getchannel("A") if image.has_transparency_data else None
     name: str | None = None

@@ -93,13 +93,12 @@ class AnimatedPicture(PictureStream):
 def _count(path: Path) -> int:
     """Count the pictures of a file by its headers; 1 if it is for readers of photos."""
     data = read_bytes(path, "picture")
-    if fault := find_png_fault(data):
-        raise InputError(f"picture {path} is {fault}; save it again")
     try:
         with explain_damage(str(path)), open_image(io.BytesIO(data), str(path)) as file:
-            return 1 if file.format in PHOTOS_WITH_MORE else getattr(file, "n_frames", 1)
+            count = 1 if file.format in PHOTOS_WITH_MORE else getattr(file, "n_frames", 1)
     except InputError:
-        return 1  # whoever reads photos says what is wrong
+        return 1  # they say what is wrong
+    return 1 if count > 1 and find_png_fault(data) else count
 
 
 def _decode_part(
