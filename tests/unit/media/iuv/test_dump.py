@@ -267,7 +267,7 @@ def test_a_known_class_is_only_a_record(studio, opcode: str) -> None:
 
 ARRAY = b"cnumpy.core.multiarray\n_reconstruct\n)R"
 TYPE = b"cnumpy\ndtype\n(X\x02\0\0\0u1\x89\x88tR"
-TUPLES = b")" + b"\x85" * 200_000  # a tuple in a tuple in a tuple ...
+TUPLES = b")" + b"\x85" * 50_000  # a tuple in a tuple in a tuple ...
 
 
 @pytest.mark.parametrize(
@@ -311,12 +311,11 @@ def test_hostile_opcodes_are_refused_by_name(studio, opcodes: bytes, reason: str
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", [2, 5])
 def test_a_pickle_cut_anywhere_is_refused(studio, protocol: int) -> None:
     path = studio.folder / "results.pkl"
-    frame = np.full((3, 2, 3), (1, 200, 9), np.uint8)
-    entries = [{**dump.photo_of_2020(frame, "a"), "scores": np.ones(1)}, dump.photo(frame, "b")]
-    data = dump.save_pickle(path, entries, protocol).read_bytes()
+    entry = dump.array_photo(np.full((3, 2, 3), (1, 200, 9), np.uint8), "a")
+    data = dump.save_pickle(path, [entry], protocol).read_bytes()
     for end in range(len(data)):
         path.write_bytes(data[:end])
         with pytest.raises(IuvFileError, match=r"is not a whole|is refused"):
