@@ -130,7 +130,7 @@ def open_image(file: BinaryIO, where: str) -> Image.Image:
     """
     head = file.read(256)
     file.seek(0)
-    if _is_heif(head):
+    if is_heif(head):
         try:
             require_extra("heic")
         except InputError as error:
@@ -181,7 +181,7 @@ def decode_photo(file: Image.Image, path: Path, where: str) -> Photo:
     return Photo(path, rgb, opacity, said in TURNS, name, tuple(notes))
 
 
-def _is_heif(head: bytes) -> bool:
+def is_heif(head: bytes) -> bool:
     """Tell whether a file's first box is HEIC's, whatever the file is called: phones write JPEG."""
     if head[4:8] != b"ftyp":
         return False

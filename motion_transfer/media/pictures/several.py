@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
 
+import imageio.v3 as iio
 from PIL import Image
 
 from motion_transfer.errors import InputError
 from motion_transfer.media.files import read_bytes
-from motion_transfer.media.pictures.photo import Photo, decode_photo, explain_damage, open_image
+from motion_transfer.media.pictures.photo import (
+    Photo,
+    decode_photo,
+    explain_damage,
+    is_heif,
+    open_image,
+)
 from motion_transfer.media.pictures.png import find_png_fault
 from motion_transfer.media.pictures.stream import (
     LARGEST_DENOMINATOR,
@@ -28,8 +34,7 @@ SUBFILE_TYPE, REDUCED = 254, 1
 """The tag of a TIFF page's type, and its bit that marks a smaller copy of another page, such as a
 thumbnail."""
 
-PHOTOS_WITH_MORE = ("MPO", "HEIF")
-"""Formats of phones, whose files may hold depth or a burst as well, whatever the file is called."""
+JPEG_SIGNATURE = b"\xff\xd8\xff"
 
 
 def open_several(path: Path) -> PictureStream:
@@ -93,12 +98,15 @@ class AnimatedPicture(PictureStream):
 def _count(path: Path) -> int:
     """Count the pictures of a file by its headers; 1 if it is for readers of photos."""
     data = read_bytes(path, "picture")
+    # whatever a phone's photo is called, what else lies in it is depth or a burst
+    if data.startswith(JPEG_SIGNATURE) or is_heif(data) or find_png_fault(data):
+        return 1
     try:
-        with explain_damage(str(path)), open_image(io.BytesIO(data), str(path)) as file:
-            count = 1 if file.format in PHOTOS_WITH_MORE else getattr(file, "n_frames", 1)
+        with explain_damage(str(path)), iio.imopen(data, "r", plugin="pillow") as file:
+            # `...` stands for all pictures, which the types leave out
+            return file.properties(index=...).n_images or 1  # pyright: ignore[reportArgumentType]
     except InputError:
-        return 1  # they say what is wrong
-    return 1 if count > 1 and find_png_fault(data) else count
+        return 1  # readers of photos say what is wrong
 
 
 def _decode_part(
