@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+QUIET = threading.RLock()
+"""Two threads that take turns halfway would leave standard error closed to everybody."""
 
 
 @contextmanager
 def quiet_libraries() -> Iterator[None]:
     """Keep off standard error what native code writes there, in whatever thread, for a moment."""
-    try:
-        stderr = os.dup(2)
-    except OSError:  # closed, and so quiet
-        yield
-        return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
+    with QUIET:
+        try:
+            stderr = os.dup(2)
+        except OSError:  # closed, and so quiet
+            yield
+            return
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        try:
+            os.dup2(nowhere, 2)
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+            os.close(nowhere)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.iuv.blends import BlendMeter, mend_blends
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.repair.gaps import blend, fill_gaps
 from motion_transfer.repair.run import FlickerMeter, RepairOptions, remove_speckles, repair_iuv
@@ -191,7 +193,55 @@ def test_a_repair_is_written_and_measured(studio, mt) -> None:
 def test_nothing_to_repair_is_said(studio, mt) -> None:
     result = mt("iuv", "repair", studio.driver(2), "-o", studio.folder / "out")
     assert result.code == 2
-    assert "nothing to repair: add --fill-gaps" in result.err
+    assert "nothing to repair: " in result.err
+    assert "add --fill-gaps" in result.err
+
+
+# --- blends
+
+
+@pytest.mark.parametrize(
+    ("how", "scale"),
+    [
+        *[(cv2.INTER_LINEAR, scale) for scale in (0.6, 1.5, 3.0)],
+        *[(cv2.INTER_CUBIC, scale) for scale in (0.6, 1.5)],
+        (cv2.INTER_AREA, 0.6),
+    ],
+)
+def test_blends_are_told_and_mended_without_being_asked(studio, mt, how: int, scale: float) -> None:
+    large = [studio.iuv(scale=4, size=(384, 256))] * 2
+    size = round(256 * scale), round(384 * scale)
+    right = cv2.resize(large[0], size, interpolation=cv2.INTER_NEAREST_EXACT)
+    blended = [
+        cv2.resize(frame, size, interpolation=how).clip(0, (24, 255, 255)) for frame in large
+    ]
+    source = studio.driver(np.stack(blended).astype(np.uint8))
+    output = studio.folder / "mended"
+    assert "resized with interpolation" in mt("inspect", source).out
+    result = mt("iuv", "repair", source, "-o", output)
+    assert result.code == 0
+    assert "% of the body's pixels that have a part found nowhere near" in result.err
+    mended = next(iter(open_reader(open_stream(output)).read(0, 1)))
+    wrong = [(frame[..., 0] != right[..., 0]).sum() for frame in (blended[0], mended)]
+    assert wrong[1] < 0.5 * wrong[0]
+    assert "resized with interpolation" not in mt("inspect", output).out
+
+
+@pytest.mark.parametrize("scale", [0.3, 0.6, 1.0, 1.5, 4.0])
+def test_iuv_resized_by_nearest_neighbour_is_sound(studio, scale: float) -> None:
+    meter = BlendMeter()
+    frame = studio.iuv(scale=4, size=(384, 256))
+    meter.add(cv2.resize(frame, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST))
+    assert not meter.found
+    assert meter.warn("driver") is None
+
+
+def test_u_and_v_left_in_the_background_go() -> None:
+    frame = np.zeros((8, 8, 3), np.uint8)
+    frame[2:6, 2:6] = (5, 100, 100)
+    clean = frame.copy()
+    frame[1, 2:6] = (0, 30, 30)
+    np.testing.assert_array_equal(mend_blends(frame), clean)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +73,68 @@ def picture(studio, kind: str) -> Path:
 def test_what_is_no_iuv_is_refused_by_name(studio, kind: str, reason: str) -> None:
     with pytest.raises(IuvFileError, match=rf"^frame 7, .*frame\.png .*{reason}"):
         read_raw_iuv(picture(studio, kind), "frame 7,")
+
+
+def test_a_palette_keeps_the_numbers_and_a_black_grey_shows_nobody(studio) -> None:
+    iuv = studio.iuv()
+    iuv[..., 1:] //= 64  # few colours: a palette holds them all
+    path = studio.folder / "palette.png"
+    Image.fromarray(iuv).quantize(256, dither=Image.Dither.NONE).save(path)
+    assert np.abs(read_raw_iuv(path).astype(int) - iuv).max() <= 1
+    Image.new("1", (7, 5)).save(path)
+    np.testing.assert_array_equal(read_raw_iuv(path), np.zeros((5, 7, 3), np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("mode", "options", "reason"),
+    [
+        ("CMYK", {}, "holds CMYK pixels"),
+        ("F", {}, "32 bits a channel"),
+        ("RGB", {"save_all": True, "append_images": [Image.new("RGB", (8, 8))]}, "2 pictures"),
+        ("RGB", {"compression": "jpeg"}, "JPEG inside a TIFF"),
+    ],
+)
+def test_other_tiffs_are_refused(tmp_path: Path, mode: str, options: dict, reason: str) -> None:
+    Image.new(mode, (8, 8)).save(tmp_path / "a.tif", **options)
+    with pytest.raises(IuvFileError, match=rf"a\.tif .*{reason}"):
+        read_raw_iuv(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize("suffix", [".bmp", ".tif"])
+def test_what_breaks_off_is_refused(studio, suffix: str) -> None:
+    path = studio.image(f"frame{suffix}", studio.iuv())
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(IuvFileError, match="is (truncated|damaged)"):
+        read_raw_iuv(path)
+
+
+@pytest.mark.parametrize(
+    ("size", "raw", "reason"),
+    [
+        ((60000, 60000), b"", "too large: 60000 x 60000"),
+        ((2, 4), bytes(7) * 2, "truncated"),
+        ((2, 2), b"\x09" + bytes(13), "unknown filter"),
+        ((0, 2), bytes(2), "no pixels"),
+    ],
+)
+def test_a_png_of_right_checksums_may_be_wrong(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    size: tuple[int, int],
+    raw: bytes,
+    reason: str,
+) -> None:
+    header = struct.pack(">IIBBBBB", *size, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(raw)), (b"IEND", b"")]
+    packed = (
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(packed))
+    with pytest.raises(IuvFileError, match=reason):
+        read_raw_iuv(tmp_path / "a.png")
+    assert capfd.readouterr().err == ""
 
 
 def test_order_is_decided_by_the_first_frame_that_can(studio) -> None:
