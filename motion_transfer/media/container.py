@@ -17,6 +17,7 @@ from typing import cast
 import av
 import av.logging
 from av.container import InputContainer, OutputContainer
+from av.error import FFmpegError
 from av.stream import Disposition
 
 from motion_transfer.errors import InputError
@@ -24,6 +25,9 @@ from motion_transfer.media.files import check_readable
 
 LARGEST_PICTURE = 2**27
 """Pixels: 16K (15360 x 8640) fits. A header may claim anything, and its claim becomes memory."""
+
+LISTS = (b"#EXTM3U", b"ffconcat")  # how HLS and FFmpeg's concat begin
+LIST_BYTES = 8
 
 # A decoder that meets damage conceals it, returns wrong pixels and only logs an error. Errors have
 # to reach Python for readers of IUV to hear of them, and nobody else needs to.
@@ -48,6 +52,13 @@ def open_input(path: Path, what: str = "video") -> Iterator[InputContainer]:
         options = {"fd": str(descriptor), "protocol_whitelist": "fd"} | limits
         # a title in another encoding than UTF-8 is no reason to refuse pictures
         container = av.open("fd:", options=options, metadata_errors="replace")
+    except FFmpegError as error:
+        if os.pread(descriptor, LIST_BYTES, 0).startswith(LISTS):
+            raise InputError(
+                f"{what} {path} is a list of other files and has no pictures or sound itself; name"
+                " one of those files"
+            ) from error
+        raise
     finally:
         os.close(descriptor)  # FFmpeg has one of its own
     with container:

@@ -77,7 +77,8 @@ def test_a_list_of_other_files_opens_none_of_them(
     path = tmp_path / name
     path.write_text(LISTS[name].format(folder=tmp_path))
     for read in (open_pictures, open_stream):
-        with pytest.raises(InputError, match=r"be read|readable"):
+        reason = "list of other files" if name != "session.sdp" else "be read|readable"
+        with pytest.raises(InputError, match=reason):
             read(Path(name))
     assert capfd.readouterr() == ("", "")
 
