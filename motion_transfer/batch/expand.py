@@ -230,8 +230,9 @@ class _Spread:
         try:
             return self._find_output(place, written)
         except (OSError, RuntimeError) as error:  # too long a name; links that go in circles
+            reason = error.strerror if isinstance(error, OSError) else "its links go in circles"
             raise ManifestError(
-                f"{self._text.where(place)}: {shown(written)} cannot be an output: {error}"
+                f"{self._text.where(place)}: {shown(written)} cannot be an output: {reason}"
             ) from None
 
     def _find_output(self, place: Place, written: str) -> _Output:

@@ -236,7 +236,7 @@ def _known_fields(place: Place) -> list[str]:
 
 
 def _unknown(name: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, known, 1)
+    near = difflib.get_close_matches(name[:40], known, 1)
     hint = f"did you mean {near[0]}? " if near else ""
     return f"unknown field; {hint}allowed are {', '.join(known)}"
 

@@ -261,14 +261,15 @@ def test_many_jobs_are_read_quickly(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        ({"x" * 5000: "1"}, "unknown field; allowed are"),
         ({"frames": "3:9"}, ""),  # no quotes: YAML 1.1 would read 189
         ({"output": "'{source.__class__}.mp4'"}, "is no template"),
         ({"output": "'{index:999999999}.mp4'"}, "is no template"),
         ({"output": "'{index!r}.mp4'"}, "is no template"),
         ({"output": "'{}.mp4'"}, "is no template"),
         ({"output": "'{index:04}.mp4'"}, ""),
-        ({"output": "n" * 300 + "/a/b.mp4"}, "cannot be an output: [Errno 36] File name too long"),
-        ({"output": "loop/a.mp4"}, "cannot be an output: Symlink loop"),
+        ({"output": "n" * 300 + "/a/b.mp4"}, "cannot be an output: File name too long"),
+        ({"output": "loop/a.mp4"}, "cannot be an output: its links go in circles"),
         ({"source": "'**x'"}, "is no glob that can be used"),
         ({"fps": "1e400"}, "shoot.yaml:7: '1e400' is no number that can be used"),
         ({"fps": ".nan"}, "fps '.nan'; write a number"),
@@ -299,8 +300,8 @@ def test_a_matrix_too_large_is_refused(tmp_path: Path) -> None:
         f"version: 1\nmatrix:\n  - sources: [{names}]\n    drivers: [{names}]\n"
         "    output: '{index}.mp4'\n"
     )
-    assert "shoot.yaml:3: matrix[0]: more than 100,000 jobs; split" in refusal(
-        write(tmp_path, text)
+    assert refusal(write(tmp_path, text)).endswith(
+        "matrix[0]: 400 sources with 400 drivers are more than 100,000 jobs; split them"
     )
 
 
