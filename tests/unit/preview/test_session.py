@@ -133,6 +133,25 @@ def test_a_broken_frame_is_marked_and_the_others_are_shown(
     assert picture(session.ask_frame(8, "result", session.key).result()).shape == (96, 64, 3)
 
 
+@pytest.mark.parametrize("name", ["frame_7_IUV.png", "person.png"])
+def test_a_file_that_changes_is_named_on_the_page(
+    studio, options: RenderOptions, open_session, name: str
+) -> None:
+    """Pictures of the old and of the new content side by side would be no preview."""
+    session = open_session(options)
+    session.wait_for_plan()
+    session.ask_frame(8, "result", session.key).result()
+    revision = session.state()["revision"]
+    folder = options.driver if name.startswith("frame") else options.source.parent
+    (folder / name).write_bytes((options.driver / "frame_1_IUV.png").read_bytes())
+    time.sleep(0.2)  # it looks again and again, but not all the time
+    with pytest.raises(InputError, match=f"{name} has changed since"):
+        session.ask_frame(9, "result", session.key)
+    state = session.state()
+    assert f"{name} has changed since" in state["error"]
+    assert state["revision"] > revision
+
+
 def test_a_video_can_be_read_in_any_order(studio, options: RenderOptions, monkeypatch) -> None:
     walk = studio.walk(30)
     driver = open_previewed(replace(options, driver=studio.video(walk)))
