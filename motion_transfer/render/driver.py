@@ -169,8 +169,9 @@ def scan_driver(
     """
     driver = open_driver(options, folder, listener)
     chosen = frame_range(options.frames, driver.frame_count, str(options.driver))
-    if names_file(options.driver) and not driver.pictures:  # who draws IUV here does not blend it
-        if warning := look_for_blends(driver.reader, chosen).warn(f"driver {options.driver}"):
+    if not driver.pictures and names_file(options.driver):  # what is drawn here is not blended
+        blends = look_for_blends(driver.reader, chosen)
+        if warning := blends.warn(f"driver {options.driver}"):
             listener(Notice(warning))
     listener(Stage("scan", len(chosen)))
     seen = scan_people(

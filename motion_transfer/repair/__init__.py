@@ -1,1 +1,1 @@
-"""Repairs of IUV sequences: blends, speckles, frames without people, trembling borders; all streaming."""
+"""Repairs of IUV sequences: blends, speckles, gaps, trembling borders; all streaming."""

@@ -42,6 +42,7 @@ BMP_DEPTH = slice(28, 30)
 
 # what FFmpeg says of a damaged picture, or Pillow, is raised, and nobody else needs to hear of it
 av.logging.set_level(av.logging.ERROR)
+av.logging.set_skip_repeated(False)  # or the same fault in another file is not heard of
 for name in ("libav", "PIL"):
     logging.getLogger(name).addHandler(logging.NullHandler())
 

@@ -22,6 +22,10 @@ from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.lookalikes import explain_picture, explain_scaled_uv
 from nhrr_core.iuv import PART_COUNT
 
+OVERSHOOT = 32
+"""Bicubic and Lanczos interpolation run beyond what lies at a border, by up to a quarter of it."""
+OVERSHOT = "; if it was resized with interpolation, resize it by nearest neighbour instead"
+
 Raw = UInt8[np.ndarray, "H W 3"]
 """An IUV image whose channels are still in the order of the file's RGB."""
 
@@ -101,7 +105,7 @@ def decide_order(frames: Iterable[tuple[str, Raw]], what: str) -> ChannelOrder |
             raise IuvFileError(
                 f"{where} is not an IUV image: neither its first nor its last channel stays within"
                 f" 0..{PART_COUNT} (they reach {first} and {last})"
-                + (f"; {known}" if known else "")
+                + (f"; {known}" if known else OVERSHOT * (min(first, last) <= OVERSHOOT))
             )
         if first > PART_COUNT or last > PART_COUNT:
             order: ChannelOrder = "vui" if first > PART_COUNT else "iuv"
@@ -126,6 +130,7 @@ def to_iuv(raw: Raw, order: ChannelOrder, where: str) -> UInt8[np.ndarray, "H W 
         raise IuvFileError(
             f"{where} has part index {highest}; DensePose has parts 1 to {PART_COUNT}, and other"
             f" frames say that channel {1 if order == 'iuv' else 3} holds them"
+            + (OVERSHOT if highest <= OVERSHOOT else "")
         )
     # BGR2RGB swaps the outer channels, and is faster than a reversed copy by NumPy
     return raw if order == "iuv" else cv2.cvtColor(raw, cv2.COLOR_BGR2RGB)

@@ -105,7 +105,7 @@ def test_what_breaks_off_is_refused(studio, suffix: str) -> None:
     path = studio.image(f"frame{suffix}", studio.iuv())
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
-    with pytest.raises(IuvFileError, match="is (truncated|damaged)"):
+    with pytest.raises(IuvFileError, match=r"is (truncated|damaged)"):
         read_raw_iuv(path)
 
 
@@ -170,3 +170,12 @@ def test_a_part_beyond_24_is_refused(studio) -> None:
     iuv[0, 0] = (25, 0, 0)
     with pytest.raises(IuvFileError, match="frame 3 has part index 25"):
         to_iuv(iuv, "iuv", "frame 3")
+
+
+def test_parts_beyond_24_after_bicubic_interpolation_are_explained(studio) -> None:
+    iuv = studio.iuv()
+    iuv[0, 0] = (26, 0, 0)
+    with pytest.raises(IuvFileError, match=r"part index 26.*resize it by nearest neighbour"):
+        to_iuv(iuv, "iuv", "frame 3")
+    with pytest.raises(IuvFileError, match=r"reach 26.*resize it by nearest neighbour"):
+        decide_order([("frame 3", iuv)], "driver")
