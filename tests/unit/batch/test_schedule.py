@@ -19,6 +19,7 @@ from motion_transfer.batch.report import write_report
 from motion_transfer.batch.run import Batch, count_jobs, read_batch
 from motion_transfer.batch.schedule import Scheduler, Tally
 from motion_transfer.batch.signals import Signals
+from motion_transfer.drawing.renderers.texture import TextureRecipe
 from motion_transfer.media.work import work_path
 from motion_transfer.render.plan import CHUNK_FRAMES
 
@@ -219,12 +220,43 @@ def test_a_source_that_vanishes_or_changes_under_the_batch(studio, run, walk, ch
 
     jobs = job("ben.mp4", source="ben.png", priority=1), job("anna.mp4")
     result = run(*jobs, before=meddle)
-    words = {"gone": f"{photo} does not exist", "other": f"{photo} has changed since the batch"}
+    words = {"gone": f"{photo} does not exist", "other": f"{photo} has changed since the run"}
     assert words[change] in result.failed["ben.mp4"]
     assert result.done == ["anna.mp4"]
     photo.write_bytes(content)
     result = run(*jobs)
     assert (result.done, result.tally.current) == (["ben.mp4"], 1)
+
+
+@pytest.mark.parametrize(
+    ("moment", "name"),
+    [("render", "wave.npy"), ("assemble", "ben.png"), ("assemble", "wave.npy")],
+)
+def test_no_output_stands_whose_inputs_changed(
+    studio, run, walk, monkeypatch, moment: str, name: str
+) -> None:
+    """Also when all of them have been read and drawn."""
+    monkeypatch.setattr(TextureRecipe, "texture_size", 32)  # to unfold photos takes longest
+    studio.source("ben")
+    studio.array(2, name="wave.npy")
+    file = studio.folder / name
+
+    def meddle(task: str, number: int) -> None:
+        if task == moment and number == 0:
+            if name == "wave.npy":
+                studio.array(studio.walk(4)[2:], name=name)
+            else:
+                studio.source("ben", colours={(2,): (9, 9, 9)}, parts=(2, 9, 10, 13, 14, 23, 24))
+
+    output = studio.folder / "out/ben.mp4"
+    jobs = job("ben.mp4", "ben.png", "wave.npy", priority=1), job("anna.mp4")
+    result = run(*jobs, before=meddle)
+    assert f"{file} has changed since the run began" in result.failed["ben.mp4"]
+    assert result.done == ["anna.mp4"]
+    assert not output.exists()
+    assert run(*jobs).done == ["ben.mp4"]
+    assert run(job("fresh.mp4", "ben.png", "wave.npy")).done == ["fresh.mp4"]
+    assert output.read_bytes() == output.with_name("fresh.mp4").read_bytes()
 
 
 def test_a_driver_frame_that_breaks_under_the_batch(studio, run, walk) -> None:
