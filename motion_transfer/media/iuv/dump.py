@@ -3,9 +3,8 @@
 The file is a list with a dict for each photo: `file_name`, `scores` (N), `pred_boxes_XYXY` (N x 4,
 px) and `pred_densepose`, N objects with `labels` (H x W) and `uv` (2 x H x W, floats), each as
 large as its box. Until the middle of 2020 it was one object, whose `results` are N pairs of a shape
-and a PNG. Files of `torch.save`, also of such dumps that somebody changed, are read by torch's
-unpickler for weights, and those of `pickle.dump` by ours: neither runs anything (see `unpickling`).
-In files of `torch.save` tensors stay on disk until their frame is read.
+and a PNG. Nothing in a file is run (see `dump_file`), and in those of `torch.save` tensors stay on
+disk until their frame is read.
 """
 
 from __future__ import annotations
@@ -15,31 +14,27 @@ import io
 import math
 import pickle
 import warnings
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
 import numpy as np
-import torch
 from jaxtyping import UInt8
 from PIL import ExifTags, Image
 
 from motion_transfer.errors import IuvFileError
-from motion_transfer.media.iuv.stream import IuvStream, Raw
-from motion_transfer.media.iuv.unpickling import (
-    RECORDS_AND_ARRAYS,
+from motion_transfer.media.iuv.dump_file import (
     PickledArray,
+    PickledTensor,
     Record,
-    unpickle,
+    read_dump_file,
 )
+from motion_transfer.media.iuv.stream import IuvStream, Raw
 from nhrr_core.iuv import PART_COUNT
 
 LOWEST_SCORE = 0.8  # `apply_net.py show` draws no detection below it; a dump holds them all
-ZIP_SIGNATURE = b"PK\x03\x04"
-TORCH_SIGNATURE = b"\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."
-"""What follows the protocol in files of torch before 1.6, which were no archives: a number."""
-
 LARGEST_FRAME = 2**27
 """Pixels: 16K (15360 x 8640) fits. Boxes may claim anything, and their claim becomes memory."""
 
@@ -133,38 +128,19 @@ def list_photos(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
 
 
 def _load(path: Path) -> Any:
-    allowed: list[Any] = [(stand_in, name) for name, stand_in in RECORDS_AND_ARRAYS.items()]
     try:
-        with path.open("rb") as file, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of protocols that torch.save does not take by itself
-            beginning = file.read(64)
-            zipped = beginning.startswith(ZIP_SIGNATURE)
-            if not zipped and TORCH_SIGNATURE not in beginning:
-                file.seek(0)
-                return unpickle(file)
-            with torch.serialization.safe_globals(allowed):
-                # files from before torch 1.6 are no archives, and cannot be mapped
-                return torch.load(path, map_location="cpu", weights_only=True, mmap=zipped)
+        return read_dump_file(path)
     except pickle.UnpicklingError as error:
         raise IuvFileError(
             f"{path} is refused: it holds more than DensePose results and could run code when read"
-            f" ({_first_sentence(str(error))}); write it again with apply_net.py dump"
+            f" ({shorten(str(error), 200)}); write it again with apply_net.py dump"
         ) from None
     except Exception as error:  # opcodes that do not fit each other bring about any
-        reason = _first_sentence(str(error)) or type(error).__name__
+        reason = shorten(str(error), 200) or type(error).__name__
         raise IuvFileError(
             f"{path} is not a whole detectron2 dump ({reason}); write it again with"
             " apply_net.py dump"
         ) from None
-
-
-def _first_sentence(reason: str) -> str:
-    """Take from torch's message, which advises at length, the part that names the culprit."""
-    for line in reason.splitlines():
-        for mark in ("Unsupported global", "Trying to", "Can only", "Unsupported operand"):
-            if mark in line:
-                return shorten(line[line.index(mark) :].split(". ")[0], 200)
-    return shorten(reason.partition("\n")[0], 200)
 
 
 def _name(photo: dict[str, Any]) -> str | None:
@@ -236,15 +212,13 @@ def _split(result: Record, where: str) -> list[Record]:
 
 def _numbers(value: object, what: str, where: str, kinds: str = "iuf") -> np.ndarray:
     """View a tensor or an array. Raises: IuvFileError unless its type is of one of `kinds`."""
-    if isinstance(value, PickledArray):
-        value = value.array
-    elif isinstance(value, torch.Tensor):
+    if isinstance(value, PickledArray | PickledTensor):
         try:
-            value = value.detach().cpu()
-            # which NumPy has not got
-            value = (value.float() if value.dtype == torch.bfloat16 else value).numpy()
-        except (RuntimeError, TypeError) as error:  # sparse, quantised, without numbers, ...
-            raise IuvFileError(f"{where}: {what} is an odd tensor ({error})") from None
+            value = value.array
+        except (ValueError, OSError, RuntimeError, zipfile.BadZipFile) as error:
+            raise IuvFileError(
+                f"{where}: the numbers of {what} are damaged ({error}); dump it again"
+            ) from None
     if not isinstance(value, np.ndarray):
         raise IuvFileError(f"{where}: {what} is a {type(value).__name__}, not a tensor")
     if value.dtype.kind not in kinds:

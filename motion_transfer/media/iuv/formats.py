@@ -169,4 +169,4 @@ def find_iuv_of(photo: Path) -> Path | None:
     """
     check_readable(photo, "source")
     # a photo's name may be so long that there cannot be one for its IUV
-    return next((path for path in list_iuv_names(photo) if os.path.exists(path)), None)
+    return next((path for path in list_iuv_names(photo) if os.path.exists(path)), None)  # noqa: PTH110 (raises)
