@@ -130,7 +130,7 @@ class DriverOptions(EstimatorOptions):
 
     The path may name a motion, `people:walk` (see `motion_transfer.people`). `driver_kind` None
     finds out whether it is IUV. `frames` is a half-open range, either end open. `missing` None
-    fails for numbers missing from a folder, and shows background where nobody is found.
+    fails for numbers missing from a folder or a dump, and shows background where nobody is found.
     """
 
     driver: Path = option(
@@ -164,8 +164,8 @@ class DriverOptions(EstimatorOptions):
     missing: Missing | None = option(
         "--missing",
         "Driver",
-        "Frames that show nobody, and numbers missing in a folder: hold (repeat the frame before),"
-        " background, or fail. Default: background for the former, fail for the latter.",
+        "Frames that show nobody, and numbers missing in a folder or dump: hold (repeat the frame"
+        " before), background, or fail. Default: background for the former, fail for the latter.",
         choices=MISSING,
     )
     window: str = option(
