@@ -25,8 +25,8 @@ from typing import Any
 
 from workload import SOURCE, driver_folder
 
-FRAMES = 240
-"""Five chunks, so that a kill finds some of them finished and others not."""
+FRAMES = 144
+"""Three chunks, so that a kill finds some of them finished and others not."""
 
 MT = [sys.executable, "-B", "-m", "motion_transfer"]
 ON_SMALL_DISK = (
@@ -66,9 +66,15 @@ class Bench:
         folder.mkdir()
         return folder / name
 
-    def compare(self, output: Path) -> str:
+    def compare(self, output: Path, **environment: str) -> str:
         """Go on with a run, and hold its output to the one without faults."""
-        result = subprocess.run(self.words(output), capture_output=True, text=True, check=False)
+        result = subprocess.run(
+            self.words(output),
+            capture_output=True,
+            text=True,
+            check=False,
+            env=os.environ | environment,
+        )
         if result.returncode:
             return f"going on failed: {result.stderr.strip()}"
         left = [item.name for item in output.parent.iterdir() if item != output]
@@ -79,16 +85,19 @@ class Bench:
 
 def kills(bench: Bench) -> Tries:
     """SIGKILL at any moment, then the same command again: the bytes of a run never killed."""
-    for number in range(50):
+    killed = 0
+    while killed < 50:
         output = bench.output("out.mp4")
         process = subprocess.Popen(
-            bench.words(output, "-q", "--workers", 1 + number % 3), start_new_session=True
+            bench.words(output, "-q", "--workers", 1 + killed % 3), start_new_session=True
         )
-        time.sleep(bench.random.uniform(0, bench.seconds))
-        os.killpg(process.pid, signal.SIGKILL) if process.poll() is None else None
-        process.wait()
-        # a run that had ended already is none to go on with
-        yield bench.compare(output) if process.returncode else ""
+        # the first third only loads libraries
+        time.sleep(bench.random.uniform(bench.seconds / 3, bench.seconds))
+        if process.poll() is None:  # else it had ended already, and there is nothing to go on with
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            killed += 1
+            yield bench.compare(output)
 
 
 def ray(bench: Bench) -> Tries:
@@ -110,7 +119,7 @@ def ray(bench: Bench) -> Tries:
             {
                 "version": 1,
                 "output_root": str(output.parent),
-                "retries": 30,
+                "retries": 10,
                 "jobs": [{**job, "renderer": "texture"}],
             }
         )
@@ -173,12 +182,28 @@ def full_disk(bench: Bench) -> Tries:
             yield ""
 
 
+PEAK = """
+import re, sys
+from motion_transfer.cli.main import main
+main(sys.argv[1:])
+print(re.search(r"VmPeak:\\s*(\\d+)", open("/proc/self/status").read())[1])
+"""
+"""Runs a command, and tells the most address space that it had, in KiB."""
+
+
 def memory(bench: Bench) -> Tries:
-    """Too little address space, at ten sizes: it ends well or with one line, never half-written."""
+    """Ten limits between what libraries need and what a run does: whole, or one line says why."""
     import resource
 
-    for gigabytes in (0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0):
-        size = int(gigabytes * 2**30)
+    def peak(*words: str) -> int:
+        command = [sys.executable, "-B", "-c", PEAK, *words]
+        result = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+        return int(result.stdout.split()[-1]) * 1024
+
+    words = bench.words(bench.output("out.mp4"), "-q")[len(MT) :]
+    least, most = peak(*words, "--frames", "0:1"), peak(*words)
+    for number in range(10):
+        size = least + (most - least) * number // 10
         output = bench.output("out.mp4")
         result = subprocess.run(
             bench.words(output, "-q"),
@@ -190,10 +215,10 @@ def memory(bench: Bench) -> Tries:
         lines = result.stderr.splitlines()
         if result.returncode == 0:
             yield "" if output.read_bytes() == bench.whole else "other bytes"
-        elif len(lines) != 1 or output.exists():
-            yield f"{gigabytes} GiB: exit code {result.returncode}, lines {lines[:1]}{lines[-1:]}"
+        elif len(lines) != 1 or "memory" not in lines[0] or output.exists():
+            yield f"{size >> 20} MiB: exit code {result.returncode}, {lines[:1]}...{lines[-1:]}"
         else:
-            yield ""
+            yield bench.compare(output)
 
 
 def at_stage(bench: Bench, stage: str, change: Callable[[], object]) -> tuple[int, list[str]]:
@@ -254,8 +279,18 @@ def disturbed(bench: Bench, change: Callable[[Path], object]) -> Tries:
             yield bench.compare(bench.folder / "outputs/out.mp4")
 
 
+JUMPS = """
+import time
+began, real, real_ns = time.monotonic(), time.time, time.time_ns
+hours = lambda: int((time.monotonic() - began) * 5)
+time.time = lambda: real() - 3600 * hours()
+time.time_ns = lambda: real_ns() - 3600 * 10**9 * hours()
+"""
+"""A clock that is set back by an hour five times a second."""
+
+
 def clock(bench: Bench) -> Tries:
-    """Files of the future and of the past, and a killed run that goes on after the clock jumped."""
+    """Files of the future and of the past, and runs while the clock is set back again and again."""
     for year in (1975, 2000, 2060, 2100):
         output = bench.output("out.mp4")
         process = subprocess.Popen(bench.words(output, "-q"), start_new_session=True)
@@ -266,6 +301,10 @@ def clock(bench: Bench) -> Tries:
         for file in (*bench.driver.iterdir(), bench.source, *output.parent.rglob("*")):
             os.utime(file, (seconds, seconds))
         yield bench.compare(output)
+    (bench.folder / "sitecustomize.py").write_text(JUMPS)
+    path = os.pathsep.join(filter(None, (str(bench.folder), os.environ.get("PYTHONPATH"))))
+    for _ in range(4):
+        yield bench.compare(bench.output("out.mp4"), PYTHONPATH=path)
 
 
 def two_runs(bench: Bench) -> Tries:
