@@ -124,17 +124,19 @@ def ray(bench: Bench) -> Tries:
             }
         )
     )
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    cluster, lost = Cluster(initialize_head=True, head_node_args={"num_cpus": 0}), 0
     try:
-        node, lost = cluster.add_node(num_cpus=1), 0
+        nodes = [cluster.add_node(num_cpus=1)]
         address = ("--engine", "ray", "--address", cluster.address, "--workers", "1", "--json")
         with subprocess.Popen(
             [*MT, "batch", "run", str(manifest), *address], stdout=subprocess.PIPE, text=True
         ) as process:
             for line in process.stdout or ():
                 if json.loads(line)["event"] == "jobframes" and lost < 20:
-                    cluster.remove_node(node, allow_graceful=False)
-                    node, lost = cluster.add_node(num_cpus=1), lost + 1
+                    while len(nodes) < 2:  # the other one takes over
+                        nodes.append(cluster.add_node(num_cpus=1))
+                    cluster.remove_node(nodes.pop(0), allow_graceful=False)
+                    lost += 1
     finally:
         cluster.shutdown()
     same = process.returncode == 0
@@ -200,7 +202,7 @@ def memory(bench: Bench) -> Tries:
         result = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
         return int(result.stdout.split()[-1]) * 1024
 
-    words = bench.words(bench.output("out.mp4"), "-q")[len(MT) :]
+    words = bench.words(bench.output("out.mp4"), "-q", "--force")[len(MT) :]
     least, most = peak(*words, "--frames", "0:1"), peak(*words)
     for number in range(10):
         size = least + (most - least) * number // 10

@@ -212,7 +212,7 @@ class ManifestText:
                 lines[self._sentence(detail)] = None
             else:
                 lines[f"--set {setting}: {_reason(detail)}"] = None
-        return ManifestError("\n".join(lines))
+        return ManifestError(*lines)
 
     def _sentence(self, detail: ErrorDetails) -> str:
         place = detail["loc"]

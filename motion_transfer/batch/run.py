@@ -78,7 +78,7 @@ def check_batch(batch: Batch) -> None:
     if problems:
         more = [f"and {len(problems) - MOST_PROBLEMS} more"] * (len(problems) > MOST_PROBLEMS)
         lines = [f"{batch.path}: {words}" for words in problems[:MOST_PROBLEMS]]
-        raise ManifestError("\n".join(lines + more))
+        raise ManifestError(*lines, *more)
 
 
 def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
