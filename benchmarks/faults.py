@@ -66,6 +66,16 @@ class Bench:
         folder.mkdir()
         return folder / name
 
+    def kill(self, output: Path, share: float, *more: object) -> bool:
+        """Start a run, and kill it after a share of its time; tell whether it had not ended."""
+        process = subprocess.Popen(self.words(output, "-q", *more), start_new_session=True)
+        time.sleep(self.seconds * share)
+        if process.poll() is not None:
+            return False
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        return [*output.parent.iterdir()] != [output]  # else it was about to leave
+
     def compare(self, output: Path, **environment: str) -> str:
         """Go on with a run, and hold its output to the one without faults."""
         result = subprocess.run(
@@ -88,14 +98,9 @@ def kills(bench: Bench) -> Tries:
     killed = 0
     while killed < 50:
         output = bench.output("out.mp4")
-        process = subprocess.Popen(
-            bench.words(output, "-q", "--workers", 1 + killed % 3), start_new_session=True
-        )
         # the first third only loads libraries
-        time.sleep(bench.random.uniform(bench.seconds / 3, bench.seconds))
-        if process.poll() is None:  # else it had ended already, and there is nothing to go on with
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        share = bench.random.uniform(1 / 3, 1)
+        if bench.kill(output, share, "--workers", 1 + killed % 3):
             killed += 1
             yield bench.compare(output)
 
@@ -295,10 +300,8 @@ def clock(bench: Bench) -> Tries:
     """Files of the future and of the past, and runs while the clock is set back again and again."""
     for year in (1975, 2000, 2060, 2100):
         output = bench.output("out.mp4")
-        process = subprocess.Popen(bench.words(output, "-q"), start_new_session=True)
-        time.sleep(bench.seconds * 0.8)
-        process.kill()
-        process.wait()
+        while not bench.kill(output, 0.8):
+            output = bench.output("out.mp4")
         seconds = (year - 1970) * 365 * 86400
         for file in (*bench.driver.iterdir(), bench.source, *output.parent.rglob("*")):
             os.utime(file, (seconds, seconds))

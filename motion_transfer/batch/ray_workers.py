@@ -17,10 +17,10 @@ from motion_transfer.batch.tasks import Fetch
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
 
-# Read when ray is imported. An actor without a GPU of its own keeps CUDA_VISIBLE_DEVICES as it is.
+# read when ray is imported: an actor without a GPU of its own keeps CUDA_VISIBLE_DEVICES as it is
 os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
-# Of a node that dies Ray tells on standard output, which belongs to our results: nothing is shown of
-# lines that match this, as all do.
+# Ray tells of a node that died on standard output, where results and JSON lines are: what matches
+# this, as all does, is not shown
 os.environ.setdefault("RAY_DEDUP_LOGS_SKIP_REGEX", "^")
 
 

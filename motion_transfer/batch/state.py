@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.media.publish import explain_disk_errors
+from motion_transfer.media.publish import explain_disk_errors, extend_name
 from motion_transfer.media.unchanged import content_key
 from motion_transfer.media.work import Journal, WorkFolder, key_of, locked, work_path
 from motion_transfer.option import list_options
@@ -92,8 +92,8 @@ class BatchState:
     """
 
     def __init__(self, manifest: Path, output_root: Path) -> None:
-        self.folder = output_root / f".{manifest.stem}.batch"
-        self.report = output_root / f"{manifest.stem}.report"
+        self.folder = output_root / ("." + extend_name(manifest.stem, ".batch"))
+        self.report = output_root / extend_name(manifest.stem, ".report")
         self.scratch = self.folder / "scratch"
         self.estimates = (self.folder / "estimates").absolute()
         self._manifest = manifest

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import resource
 import signal
 import sys
 import traceback
@@ -13,7 +15,7 @@ from types import FrameType
 import click
 
 from motion_transfer.cli.terminal import printable
-from motion_transfer.errors import MotionTransferError
+from motion_transfer.errors import MotionTransferError, RenderError
 from motion_transfer.version import __version__
 
 COMMANDS = {
@@ -31,6 +33,15 @@ COMMANDS = {
 }
 HOMES = {"demo": "run", "inspect": "info", "models": "info"}
 """Commands that stand in another one's module."""
+
+OUT_OF_MEMORY = (
+    *("can't allocate memory", "Cannot allocate memory", "out of memory", "Insufficient memory"),
+    *("bad_alloc", "failed to map segment", "can't start new thread"),
+)
+"""What libraries say where memory ends, from the loader of libraries on."""
+
+LEAST_ADDRESS_SPACE_BYTES = 3 << 29
+"""With two cores OpenBLAS waits without end at 1.2 GiB, and any run needs 1.7."""
 
 INTERRUPTED = 130  # 128 and the signal's number, as shells have it
 TERMINATED = 143
@@ -56,6 +67,7 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
+        _check_address_space()
         module = import_module(f"motion_transfer.cli.{HOMES.get(cmd_name, cmd_name)}")
         # `eval_` for `eval`: a function does not take a builtin's name
         command = getattr(module, cmd_name, None) or getattr(module, f"{cmd_name}_")
@@ -122,12 +134,13 @@ def _explain(error: Exception) -> tuple[int, list[str]]:
             return error.exit_code, [printable(line) for line in error.lines]
         case OSError() if _while_printing(error):
             return UNEXPECTED, [f"cannot write to standard output: {error.strerror}"]
-        case OSError() if error.filename is not None:  # a name that no check has foreseen
-            return UNUSABLE, [printable(f"{os.fsdecode(error.filename)}: {error.strerror}")]
         case _ if _is_memory_error(error):
             return UNEXPECTED, [
-                "the memory is used up; give fewer --workers, a smaller picture, or more memory"
+                "the memory is used up; give fewer --workers, a smaller picture, or more memory (or"
+                " threads, see `ulimit -a`)"
             ]
+        case OSError() if error.filename is not None:  # a name that no check has foreseen
+            return UNUSABLE, [printable(f"{os.fsdecode(error.filename)}: {error.strerror}")]
     kind, said = type(error).__name__, printable(next(iter(str(error).splitlines()), ""))
     return UNEXPECTED, [
         f"unexpected {kind}{': ' * bool(said)}{said}; this is a fault of the program: please report"
@@ -143,9 +156,25 @@ def _while_printing(error: Exception) -> bool:
 
 
 def _is_memory_error(error: Exception) -> bool:
-    """Tell whether memory ran out, in the words of whatever library wanted it."""
-    marks = ("can't allocate memory", "out of memory", "Insufficient memory")
-    return isinstance(error, MemoryError) or any(mark in str(error) for mark in marks)
+    """Tell whether memory, or the threads that are allowed, ran out; libraries have many words."""
+    return (
+        isinstance(error, MemoryError)
+        or (isinstance(error, OSError) and error.errno in (errno.ENOMEM, errno.EAGAIN))
+        or any(mark in str(error) for mark in OUT_OF_MEMORY)
+    )
+
+
+def _check_address_space() -> None:
+    """Refuse a limit under which libraries would not begin, but crash or wait without end.
+
+    Raises: RenderError.
+    """
+    allowed_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if allowed_bytes != resource.RLIM_INFINITY and allowed_bytes < LEAST_ADDRESS_SPACE_BYTES:
+        raise RenderError(
+            f"only {allowed_bytes >> 20} MiB of memory may be addressed, and libraries alone need"
+            f" {LEAST_ADDRESS_SPACE_BYTES >> 20}; allow more by `ulimit -v`, best unlimited"
+        )
 
 
 def _add_debug(command: click.Command) -> None:

@@ -24,20 +24,25 @@ RANDOM_ENDING_BYTES = 16
 
 
 def name_beside(final: Path, ending: str) -> Path:
-    """Name something hidden beside an output, always the same for the same output.
+    """Name something hidden beside an output, always the same for the same output."""
+    return final.absolute().with_name("." + extend_name(final.name, ending))
 
-    An output's name may be as long as the file system takes: there is no room for more then, so
-    that it is cut, and a digest stands for the rest.
+
+def extend_name(name: str, ending: str) -> str:
+    """Put an ending behind a name, always the same for the same name.
+
+    A name may be as long as the file system takes: there is no room for more then, so that it is
+    cut, and a digest stands for the rest. A dot before it has room.
     """
-    name = os.fsencode(final.name)
+    encoded = os.fsencode(name)
     added = os.fsencode(f".{ending}")
-    if len(name) + len(added) + RANDOM_ENDING_BYTES > LONGEST_NAME_BYTES:
-        digest = hashlib.sha256(name).hexdigest()[:16].encode()
+    if len(encoded) + len(added) + RANDOM_ENDING_BYTES > LONGEST_NAME_BYTES:
+        digest = hashlib.sha256(encoded).hexdigest()[:16].encode()
         room = LONGEST_NAME_BYTES - RANDOM_ENDING_BYTES - len(added) - len(digest) - 1
         # whole characters only: some file systems take nothing but text
-        kept = name[:room].decode("utf-8", "ignore")
-        name = kept.encode() + b"-" + digest
-    return final.absolute().with_name("." + os.fsdecode(name) + ending)
+        kept = encoded[:room].decode("utf-8", "ignore")
+        encoded = kept.encode() + b"-" + digest
+    return os.fsdecode(encoded) + ending
 
 
 def check_destination(path: Path, *, force: bool) -> None:
@@ -119,6 +124,7 @@ def explain_disk_errors(final: Path) -> Iterator[None]:
             errno.EACCES: "no permission; write elsewhere",
             errno.EPERM: "no permission; write elsewhere",
             errno.EROFS: "the file system is read-only; write elsewhere",
+            errno.ENOENT: "a folder was removed that it is written in; start again",
             errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
         }
         if error.errno not in reasons:

@@ -18,7 +18,7 @@ import socket
 import threading
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -155,6 +155,9 @@ class WorkFolder:
 
     def clear(self) -> None:
         """Remove the folder: the output is published, or there is nothing to keep."""
+        with suppress(OSError):
+            # the journal last: if this is stopped, the next run knows that all is published
+            self._remove_content(but=("journal.jsonl", "lock"))
         shutil.rmtree(self.path, ignore_errors=True)
         self._pieces = {}
         if not self._final.exists():
@@ -205,9 +208,9 @@ class WorkFolder:
         for stray in self.path.glob("*.part-*"):
             _remove(stray)
 
-    def _remove_content(self) -> None:
+    def _remove_content(self, but: tuple[str, ...] = ("lock", "owner.json")) -> None:
         for item in self.path.iterdir():
-            if item.name not in ("lock", "owner.json"):
+            if item.name not in but:
                 _remove(item)
 
 

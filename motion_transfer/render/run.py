@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from motion_transfer.errors import OutputError
 from motion_transfer.events import (
     Finished,
     FramesDone,
@@ -210,7 +211,14 @@ def _render(
             engine.render(chunks, workers, finish)
             finished = assemble(options, prepared, work.path, sheet)
             work.publish(finished, key)
-    except BaseException:
+    except BaseException as error:
+        if (
+            isinstance(error, Exception) and not work.path.exists()
+        ):  # whatever failed for want of it
+            raise OutputError(
+                f"cannot write {options.output}: a folder was removed that it is written in; start"
+                " again"
+            ) from error
         if done:
             listener(
                 Notice(

@@ -26,6 +26,7 @@ from motion_transfer.drawing.source import SourcePicture, unfold_picture
 from motion_transfer.drawing.window import TRAINED_UNSCALED, Window, plan_window
 from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.media.publish import name_beside
 from motion_transfer.option import parse_colour
 from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.pairs import Pair, Pairs, flat_stem
@@ -164,7 +165,7 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             # texture and visibility as one RGBA picture
             ok, encoded = cv2.imencode(".png", np.dstack([rgb[..., ::-1], seen]))
             assert ok
-            temporary = path.with_name(f".{path.name}.{os.getpid()}")
+            temporary = name_beside(path, f".{os.getpid()}")
             temporary.write_bytes(encoded.tobytes())
             temporary.replace(path)
         return rgb, seen

@@ -15,6 +15,7 @@ import torch
 from safetensors.torch import save_file
 
 from motion_transfer.errors import InputError, WeightsError
+from motion_transfer.media.publish import name_beside
 from motion_transfer.media.structured import parse_json, shown
 from motion_transfer.media.work import digest_file
 from motion_transfer.weights.tensors import check_weights, load_network, read_header
@@ -53,7 +54,7 @@ def save_checkpoint(
         stored = dtype if tensor.is_floating_point() else None
         state[name] = tensor.detach().to("cpu", stored).contiguous()
     metadata = {"format": FORMAT, "config": json.dumps(model.config.to_dict()), **(notes or {})}
-    temporary = path.with_name(f".{path.name}.part")
+    temporary = name_beside(path, ".part")
     try:
         save_file(state, temporary, metadata=metadata)
         temporary.chmod(0o644)  # safetensors writes for the owner only

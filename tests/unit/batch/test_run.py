@@ -83,3 +83,13 @@ def test_jobs_are_chosen_by_their_numbers(tmp_path: Path) -> None:
     for chosen, expected in [((3, 7), [3, 4, 5, 6]), ((None, 2), [0, 1]), ((7, None), [7, 8])]:
         options = BatchOptions(manifest=path, chosen=chosen)
         assert [job.index for job in choose_jobs(jobs, options)] == expected
+
+
+@pytest.mark.parametrize("length", [240, 255])
+def test_a_manifest_with_a_name_as_long_as_can_be_is_run(mt, manifest: Path, length: int) -> None:
+    long = manifest.rename(manifest.with_name("人" * ((length - 5) // 3) + ".yaml"))
+    assert mt("batch", "run", long, "--set", "frames=0:1", "--workers", "1").code == 0
+    assert (manifest.parent / "a.png").exists()
+    (report,) = manifest.parent.glob("人*.report/index.html")
+    assert len(report.parent.name.encode()) <= 255
+    assert mt("batch", "clean", long).out == "removed 1 work folders\n"

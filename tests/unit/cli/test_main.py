@@ -43,6 +43,11 @@ def failing(monkeypatch: pytest.MonkeyPatch):
         (OSError(errno.ENAMETOOLONG, "File name too long", "x"), 2, "mt: x: File name too long"),
         (MemoryError(), 1, "mt: the memory is used up; give fewer --workers"),
         (RuntimeError("DefaultCPUAllocator: can't allocate memory: you"), 1, "mt: the memory is"),
+        (RuntimeError("can't start new thread"), 1, "mt: the memory is used up"),
+        (Exception("std::bad_alloc"), 1, "mt: the memory is used up"),
+        (ImportError("x.so: failed to map segment from shared object"), 1, "mt: the memory is"),
+        (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), 1, "mt: the memory is"),
+        (OSError(errno.ENOMEM, "Cannot allocate memory", "x"), 1, "mt: the memory is used up"),
         (KeyError("key"), 1, "mt: unexpected KeyError: 'key'; this is a fault of the program"),
         (RecursionError(), 1, "mt: unexpected RecursionError; this is a fault of the program"),
         (ValueError("one\ntwo"), 1, "mt: unexpected ValueError: one; this"),
@@ -84,6 +89,15 @@ def test_warnings_of_libraries_are_kept_from_users(monkeypatch, capsys) -> None:
     monkeypatch.setattr(sys, "warnoptions", [])
     assert program.main(["info"]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_a_limit_under_which_libraries_crash_is_one_line(monkeypatch, capsys) -> None:
+    monkeypatch.setattr(program.resource, "getrlimit", lambda _which: (1200 << 20, 1 << 40))
+    assert program.main(["info", "parts"]) == 1
+    assert capsys.readouterr().err == (
+        "mt: only 1200 MiB of memory may be addressed, and libraries alone need 1536; allow more by"
+        " `ulimit -v`, best unlimited\n"
+    )
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux' /dev/full")

@@ -103,7 +103,12 @@ def test_a_read_only_folder_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "reason"), [(errno.ENOSPC, "disk is full"), (errno.EROFS, "read-only")]
+    ("number", "reason"),
+    [
+        (errno.ENOSPC, "disk is full"),
+        (errno.EROFS, "read-only"),
+        (errno.ENOENT, "a folder was removed"),
+    ],
 )
 def test_disk_errors_are_explained(number: int, reason: str) -> None:
     refused = pytest.raises(OutputError, match=f"out.mp4: .*{reason}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from motion_transfer.errors import OutputError
+from motion_transfer.media import work as work_module
 from motion_transfer.media.work import Journal, WorkFolder, digest_of, was_published, work_path
 
 
@@ -142,3 +144,36 @@ def test_a_folder_has_one_digest_and_names_count(tmp_path: Path) -> None:
     assert digest_of(tmp_path / "a") == digest_of(tmp_path / "b")
     (tmp_path / "b" / "0.png").rename(tmp_path / "b" / "1.png")
     assert digest_of(tmp_path / "a") != digest_of(tmp_path / "b")
+
+
+def test_a_line_for_which_there_is_no_room_is_not_begun(tmp_path: Path, monkeypatch) -> None:
+    journal = Journal(tmp_path / "journal.jsonl")
+    journal.append({"number": 0})
+
+    def full(_descriptor: int) -> None:  # the line is written, and cannot be kept
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(OSError, match="No space left"):
+            journal.append({"number": 1})
+    journal.append({"number": 2})
+    assert journal.read() == [{"number": 0}, {"number": 2}]
+
+
+def test_a_clearing_that_is_stopped_is_ended_by_the_next_run(tmp_path: Path, monkeypatch) -> None:
+    final = tmp_path / "out.mp4"
+
+    def stop(_path: Path, **_: object) -> None:
+        raise KeyboardInterrupt
+
+    with WorkFolder(final) as work:
+        finish(work, "0.nut", "zero", "a")
+        finished = work.path / "finished.mp4"
+        finished.write_text("whole")
+        work.publish(finished, "key")
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(work_module.shutil, "rmtree", stop)
+            work.clear()
+        assert sorted(item.name for item in work.path.iterdir()) == ["journal.jsonl", "lock"]
+        assert was_published(final)
