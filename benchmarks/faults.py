@@ -132,7 +132,7 @@ def ray(bench: Bench) -> Tries:
     cluster, lost = Cluster(initialize_head=True, head_node_args={"num_cpus": 0}), 0
     try:
         nodes = [cluster.add_node(num_cpus=1)]
-        address = ("--engine", "ray", "--address", cluster.address, "--workers", "1", "--json")
+        address = ("--engine", "ray", "--address", str(cluster.address), "--workers", "1", "--json")
         with subprocess.Popen(
             [*MT, "batch", "run", str(manifest), *address], stdout=subprocess.PIPE, text=True
         ) as process:

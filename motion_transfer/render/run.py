@@ -212,9 +212,8 @@ def _render(
             finished = assemble(options, prepared, work.path, sheet)
             work.publish(finished, key)
     except BaseException as error:
-        if (
-            isinstance(error, Exception) and not work.path.exists()
-        ):  # whatever failed for want of it
+        # whatever it was that failed for want of it
+        if isinstance(error, Exception) and not work.path.exists():
             raise OutputError(
                 f"cannot write {options.output}: a folder was removed that it is written in; start"
                 " again"
