@@ -163,7 +163,7 @@ class Engine:
         canvas = self._prepared.canvas
         try:
             results = drawn()
-        except (RuntimeError, MemoryError) as error:  # what torch raises, out of memory too
+        except RuntimeError as error:  # what torch raises, out of memory too
             first = self._plan.first + start
             raise RenderError(
                 f"the {self._renderer.name} renderer failed in the driver's frames {first} to"

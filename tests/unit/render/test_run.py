@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from motion_transfer.drawing.renderers import texture
 from motion_transfer.media.work import Journal, work_path
 from motion_transfer.render import run as run_module
 
@@ -70,3 +71,14 @@ def test_a_work_folder_that_is_removed_meanwhile_is_one_line(studio, render, mon
     )
     assert not output.exists()
     assert render().code == 0
+
+
+def test_memory_that_runs_out_while_drawing_is_one_line_with_a_remedy(render, monkeypatch) -> None:
+    def starve(*_: object) -> None:
+        raise MemoryError("Unable to allocate 1.42 MiB")
+
+    monkeypatch.setattr(texture.TextureRenderer, "render", starve)
+    failed = render()
+    assert failed.code == 1
+    assert failed.err.startswith("mt: the memory is used up; give fewer --workers, ")
+    assert failed.err.count("\n") == 1
