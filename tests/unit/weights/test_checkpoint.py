@@ -56,6 +56,12 @@ def test_half_precision_storage(tmp_path: Path, checkpoint: Path) -> None:
         torch.testing.assert_close(tensor, model.state_dict()[name].half().to(tensor.dtype))
 
 
+def test_a_name_as_long_as_can_be_is_written(tmp_path: Path, checkpoint: Path) -> None:
+    path = tmp_path / ("n" * 243 + ".safetensors")
+    save_checkpoint(path, load_checkpoint(checkpoint))
+    assert [item.name for item in tmp_path.iterdir()] == [path.name]
+
+
 def test_a_failed_write_keeps_the_old_file(tmp_path: Path, checkpoint: Path) -> None:
     path = tmp_path / "model.safetensors"
     path.write_text("old")
