@@ -27,7 +27,7 @@ INPUT_OPTIONS = [
         "--missing",
         default="fail",
         metavar="fail|hold|background",
-        help="Numbers missing in a folder or dump: stop (default), hold the frame before, or nobody.",
+        help="Numbers missing in a folder or dump: stop (default), hold the one before, or nobody.",
     ),
 ]
 OUTPUT_OPTIONS = [

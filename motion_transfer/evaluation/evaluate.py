@@ -152,10 +152,10 @@ def _check_results(
         return pairs
     what = "results do not cover the pairs"
     if not options.skip_broken:
-        raise InputError(list_problems(what, lines))
+        raise InputError(*list_problems(what, lines))
     kept = [pair for pair, found in zip(pairs, problems, strict=True) if not found]
     if not kept:
-        raise InputError(list_problems(f"{what}, none of them", lines))
+        raise InputError(*list_problems(f"{what}, none of them", lines))
     notice(f"{len(kept)} of {len(pairs)} pairs are left, as results are missing: {lines[0]}, ...")
     # other pairs are another protocol, whose numbers are not compared with the whole list's
     digest = f"{pairs.digest} of which {','.join(pair.name for pair in kept)}"

@@ -252,7 +252,7 @@ def compare(paths: Sequence[Path]) -> str:
     ]
     if problems:
         first = "these results may not be compared, as they were measured differently"
-        raise InputError("\n  ".join([first, *problems]))
+        raise InputError(first, *(f"  {problem}" for problem in problems))
     columns = {column.name: column for results in read for column in results.columns}
     methods = [
         Method(f"{_origin(path)}:{method.label}", method.description, method.scores)

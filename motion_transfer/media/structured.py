@@ -27,7 +27,7 @@ SUFFIXES = (".yaml", ".yml", ".json", ".toml")
 LARGEST_BYTES = 16 * 2**20  # a hundred thousand jobs
 DEEPEST = 64  # levels; what is written here has five
 MOST_VALUES = 2_000_000  # an alias counts as all that it stands for
-LONGEST_INTEGER = 18  # digits and sign: well within 64 bits
+LONGEST_INTEGER = 18  # digits: all such numbers have room in 64 bits
 LONGEST_SHOWN = 60  # characters of what a message repeats
 
 Place = tuple[int | str, ...]
@@ -52,7 +52,8 @@ _WORDS = {
 """What YAML 1.1 means by words without quotes."""
 
 _JSON_TOKEN = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"|[\[\]{}]|[^\s,:\[\]{}"]+|\n')
-_TOML_DOTS = re.compile(rf"[\w\"'-]+(?:[ \t]*\.[ \t]*[\w\"'-]+){{{DEEPEST}}}")
+# from the beginning of a word, and never back: else a long word takes the square of its length
+_TOML_DOTS = re.compile(rf"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++){{{DEEPEST}}}")
 _TOML_HEADER = re.compile(r"\s*(\[\[?)([^\[\]]+)\]")
 _TOML_KEY = re.compile(r"""\s*(["']?)([^"'\s=.]+)\1\s*[=.]""")
 
@@ -325,7 +326,8 @@ def _feed_json(text: str, builder: _Builder) -> None:
     except RecursionError:
         pass  # what is too deep is found below
     builder.line = 1
-    for token in _JSON_TOKEN.findall(text):
+    for match in _JSON_TOKEN.finditer(text):
+        token = match.group()
         if token == "\n":
             builder.line += 1
         elif token in "{[":
@@ -417,8 +419,9 @@ def _read_word(word: str) -> Any:
 
 
 def _read_number(written: str) -> int | float:
-    whole = written.lstrip("+-").isdecimal()
-    if whole and len(written) <= LONGEST_INTEGER:  # int() takes no more than 4300 digits
+    digits = written.lstrip("+-")
+    whole = digits.isdecimal()
+    if whole and len(digits) <= LONGEST_INTEGER:  # int() takes no more than 4300
         return int(written)
     value = float(written)
     if whole or not math.isfinite(value):

@@ -128,7 +128,7 @@ def open_clip_pairs(
             pair = Pair(source, ClipFrame(clip, index), group=clip.name, frame=index)
             entries.append((clip.name, pair))
     if not entries:
-        raise InputError(list_problems(f"folder {folder} holds no pair of frames", problems))
+        raise InputError(*list_problems(f"folder {folder} holds no pair of frames", problems))
     return check_pairs(folder.name, entries, problems, skip_broken=skip_broken, done=done)
 
 

@@ -217,7 +217,7 @@ def check_pairs(
         more = f" (and {len(where) - 1} more)" if len(where) > 1 else ""
         lines.append(f"{where[0]}{more}: {reason}")
     if lines and not skip_broken:
-        raise InputError(list_problems(name, lines))
+        raise InputError(*list_problems(name, lines))
     kept, content = [], hashlib.sha256()
     for _, pair in entries:
         names = pair.source.name, pair.target.name
@@ -226,19 +226,19 @@ def check_pairs(
             for picture_name in names:
                 content.update(f"{picture_name}\0{answers[picture_name]}\n".encode())
     if not kept:
-        raise InputError(list_problems(f"{name} holds no pair that can be used", lines))
+        raise InputError(*list_problems(f"{name} holds no pair that can be used", lines))
     return PairList(name, kept, content.hexdigest(), tuple(lines))
 
 
-def list_problems(what: str, problems: Sequence[str]) -> str:
-    """Write a message with the first problems, a line for each, and how many more there are."""
+def list_problems(what: str, problems: Sequence[str]) -> list[str]:
+    """Write the lines of a message: the first problems, and how many more there are."""
     if not problems:
-        return what
+        return [what]
     count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
     lines = [f"{what}: {count}", *(f"  {line}" for line in problems[:PROBLEMS_SHOWN])]
     if len(problems) > PROBLEMS_SHOWN:
         lines.append(f"  and {len(problems) - PROBLEMS_SHOWN} more")
-    return "\n".join([*lines, "mend them, or leave their pairs out with --skip-broken"])
+    return [*lines, "mend them, or leave their pairs out with --skip-broken"]
 
 
 def _check_pictures(

@@ -80,8 +80,8 @@ def open_training_data(
         ]
         if lacking:
             raise InputError(
-                list_problems("a model with alpha learns it from the data", lacking)
-                + "\nor train without alpha: --set model.alpha=false"
+                *list_problems("a model with alpha learns it from the data", lacking),
+                "or train without alpha: --set model.alpha=false",
             )
     return data
 

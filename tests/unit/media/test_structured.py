@@ -179,3 +179,10 @@ def test_pipes_are_not_waited_for(tmp_path: Path) -> None:
 def test_what_is_long_is_shown_in_part() -> None:
     assert shown("a\nb") == r"'a\nb'"
     assert shown("x" * 1000) == "'" + "x" * 56 + "..."
+
+
+def test_a_long_word_of_toml_takes_no_longer_than_others() -> None:
+    began = time.perf_counter()
+    with pytest.raises(InputError, match="x"):
+        parse_structured("[a]\n" + "9" * 200_000 + "\n", ".toml", "x")
+    assert time.perf_counter() - began < 5  # the square of its length took minutes
