@@ -186,7 +186,8 @@ def _add_debug(command: click.Command) -> None:
 
 
 def _remember(context: click.Context, *, debug: bool) -> None:
-    context.find_root().obj["debug"] |= debug
+    settings = context.find_root().ensure_object(dict)
+    settings["debug"] = debug or settings.get("debug", False)
 
 
 def entry_point() -> None:

@@ -24,6 +24,7 @@ from PIL import Image
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
 expect = playwright.expect
+expect.set_options(timeout=30_000)  # ms; the network draws a frame in 1 s on two idle cores
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
