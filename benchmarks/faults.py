@@ -156,11 +156,12 @@ def full_disk(bench: Bench) -> Tries:
     run = ["run", "--renderer", "texture", "--source", str(bench.source), "--driver"]
     whole, part = [*run, str(bench.driver)], [*run, str(driver)]
     iuv = ["iuv", "convert", str(driver), "-o"]
+    kilobytes = len(bench.whole) >> 10
     places = [
         ("4k", [*whole, "-o", "out.mp4"]),  # the work folder
-        ("40k", [*whole, "-o", "out.mp4"]),  # the first segments
-        ("400k", [*whole, "-o", "out.mp4"]),  # a later one
-        (f"{len(bench.whole) * 3 // 2 // 1024}k", [*whole, "-o", "out.mp4"]),  # joining
+        (f"{kilobytes // 6}k", [*whole, "-o", "out.mp4"]),  # the first segments
+        (f"{kilobytes * 2 // 3}k", [*whole, "-o", "out.mp4"]),  # a later one
+        (f"{kilobytes * 3 // 2}k", [*whole, "-o", "out.mp4"]),  # joining
         ("1m", [*whole, "-o", "frames"]),
         ("200k", [*whole, "-o", "out.gif"]),
         ("200k", [*whole, "--codec", "ffv1", "-o", "out.mkv"]),
