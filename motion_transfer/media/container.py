@@ -32,7 +32,13 @@ LIST_BYTES = 8
 # A decoder that meets damage conceals it, returns wrong pixels and only logs an error. Errors have
 # to reach Python for readers of IUV to hear of them, and nobody else needs to.
 av.logging.set_level(av.logging.ERROR)
+av.logging.set_skip_repeated(False)  # or the same fault in another file is not heard of
 logging.getLogger("libav").addHandler(logging.NullHandler())
+
+
+def hear_complaints() -> av.logging.Capture:
+    """Hear, as a list in a `with` block, what FFmpeg complains of; in this thread only."""
+    return av.logging.Capture()
 
 
 @contextmanager

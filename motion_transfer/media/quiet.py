@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 from collections.abc import Iterator
@@ -9,6 +10,9 @@ from contextlib import contextmanager
 
 QUIET = threading.RLock()
 """Two threads that take turns halfway would leave standard error closed to everybody."""
+
+# Pillow logs what it raises, too
+logging.getLogger("PIL").addHandler(logging.NullHandler())
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from jaxtyping import UInt8
 from PIL import ExifTags, Image
 
 from motion_transfer.errors import IuvFileError
+from motion_transfer.media.container import LARGEST_PICTURE
 from motion_transfer.media.iuv.dump_file import (
     PickledArray,
     PickledTensor,
@@ -35,9 +36,6 @@ from motion_transfer.media.iuv.stream import IuvStream, Raw
 from nhrr_core.iuv import PART_COUNT
 
 LOWEST_SCORE = 0.8  # `apply_net.py show` draws no detection below it; a dump holds them all
-LARGEST_FRAME = 2**27
-"""Pixels: 16K (15360 x 8640) fits. Boxes may claim anything, and their claim becomes memory."""
-
 NOBODY = np.zeros((0, 4))  # boxes of
 LONGEST_NAME = 4096  # the longest path that Linux opens
 TURNED = (5, 6, 7, 8)  # EXIF's orientations with width and height swapped; detectron2 heeds them
@@ -99,10 +97,10 @@ class DumpStream(IuvStream):
             )
             sizes = [(height, width)] * len(found)
         for index, (height, width) in enumerate(sizes):
-            if height * width > LARGEST_FRAME:
+            if height * width > LARGEST_PICTURE:
                 raise IuvFileError(
-                    f"{self.where(index)} needs {width} x {height} px; at most {LARGEST_FRAME:,} px"
-                    " are drawn, which is 16K; dump smaller photos"
+                    f"{self.where(index)} needs {width} x {height} px; at most {LARGEST_PICTURE:,}"
+                    " px are drawn, which is 16K; dump smaller photos"
                 )
         return sizes
 
@@ -267,7 +265,7 @@ def _quantise(labels: object, uv: object, where: str) -> UInt8[np.ndarray, "H W 
 
 
 def _check_parts(parts: np.ndarray, where: str) -> None:
-    if parts.size > LARGEST_FRAME:
+    if parts.size > LARGEST_PICTURE:
         raise IuvFileError(f"{where}: a person of {list(parts.shape)} px; dump it again")
     if parts.min(initial=0) < 0 or parts.max(initial=0) > PART_COUNT:
         raise IuvFileError(f"{where}: labels are not part indices, 0 to {PART_COUNT}")
@@ -277,7 +275,7 @@ def _unpack_png(text: object, where: str) -> UInt8[np.ndarray, "H W 3"]:
     try:
         packed = base64.decodebytes(str(text).encode("ascii") if isinstance(text, str) else b"")
         with _open_picture(io.BytesIO(packed), formats=("PNG",)) as file:
-            if file.mode != "RGB" or file.width * file.height > LARGEST_FRAME:
+            if file.mode != "RGB" or file.width * file.height > LARGEST_PICTURE:
                 raise ValueError(f"it is {file.mode}, {file.width} x {file.height} px")
             return np.asarray(file)
     except Exception as error:  # a picture can be broken in any way

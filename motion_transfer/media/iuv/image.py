@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import logging
 import warnings
 import zlib
 from collections.abc import Iterator
@@ -11,7 +10,6 @@ from pathlib import Path
 from typing import NoReturn, cast
 
 import av
-import av.logging
 import numpy as np
 from av.codec import CodecContext
 from av.error import FFmpegError
@@ -19,6 +17,7 @@ from jaxtyping import UInt8
 from PIL import Image, UnidentifiedImageError
 
 from motion_transfer.errors import IuvFileError
+from motion_transfer.media.container import hear_complaints
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.iuv.lookalikes import explain_grey
 from motion_transfer.media.iuv.stream import IuvStream, Raw
@@ -39,12 +38,6 @@ LARGEST_PIXELS = 358_000_000
 TIFF_BITS, TIFF_COMPRESSION = 258, 259  # tags
 TIFF_JPEG = (6, 7)
 BMP_DEPTH = slice(28, 30)
-
-# what FFmpeg says of a damaged picture, or Pillow, is raised, and nobody else needs to hear of it
-av.logging.set_level(av.logging.ERROR)
-av.logging.set_skip_repeated(False)  # or the same fault in another file is not heard of
-for name in ("libav", "PIL"):
-    logging.getLogger(name).addHandler(logging.NullHandler())
 
 
 class ImageStream(IuvStream):
@@ -113,7 +106,7 @@ def _decode_rgb_png(data: bytes) -> Raw | None:
     decoder = cast(av.VideoCodecContext, CodecContext.create("png", "r"))
     decoder.thread_count = 1  # frames are read in parallel already
     decoder.options = {"err_detect": "crccheck+explode"}
-    with av.logging.Capture() as complaints:
+    with hear_complaints() as complaints:
         try:
             frames = decoder.decode(av.Packet(data))
         except (FFmpegError, MemoryError):

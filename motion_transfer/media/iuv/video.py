@@ -11,12 +11,11 @@ from fractions import Fraction
 from pathlib import Path
 
 import av
-import av.logging
 from av.container import InputContainer
 from av.error import FFmpegError
 
 from motion_transfer.errors import IuvFileError
-from motion_transfer.media.container import find_pictures, open_input
+from motion_transfer.media.container import find_pictures, hear_complaints, open_input
 from motion_transfer.media.iuv.lookalikes import explain_picture
 from motion_transfer.media.iuv.stream import IuvStream, Raw
 from motion_transfer.media.pictures.display import (
@@ -107,7 +106,7 @@ def _decode_intact(container: InputContainer, stream: av.VideoStream) -> Iterato
     """Decode frames as long as the decoder does not complain; in this thread only."""
     frames = container.decode(stream)
     while True:
-        with av.logging.Capture() as complaints:
+        with hear_complaints() as complaints:
             frame = next(frames, None)
         if complaints:
             raise _DamagedError(" ".join(complaints[0][2].split()))

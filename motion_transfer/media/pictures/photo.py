@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -22,9 +21,6 @@ from motion_transfer.media.files import read_bytes
 from motion_transfer.media.pictures.colours import ProfileError, convert_lab, convert_to_srgb
 from motion_transfer.media.pictures.png import find_png_fault
 from motion_transfer.media.quiet import quiet_libraries
-
-# Pillow logs what it raises, too
-logging.getLogger("PIL").addHandler(logging.NullHandler())
 
 HEIF_BRANDS = set(b"heic heix heim heis hevc hevx hevm hevs mif1 msf1".split())
 AVIF_BRANDS = {b"avif", b"avis"}
