@@ -104,6 +104,19 @@ def drive(
 @people_option(
     "--split", default="train", metavar="NAME", help="train (default) or held-out: never the same."
 )
+@people_option(
+    "--assets",
+    type=FILE,
+    metavar="DIR",
+    help="MakeHuman's assets: people in photographed skins, clothes and hair; else MT_ASSETS.",
+)
+@people_option(
+    "--free",
+    "free_share",
+    type=float,
+    metavar="SHARE",
+    help="How many of the people those are, 0 to 1; default 0.5 with assets.",
+)
 @picture_option("--size", default="256x256", metavar="WxH", help="Pixels; default 256x256.")
 @picture_option("--framing", metavar="PART", help="full, three-quarters or upper; default: mixed.")
 @picture_option(
@@ -118,7 +131,7 @@ def drive(
 @output_option("-o", "--out", type=FILE, required=True, help="A folder; completed if it has some.")
 @output_option("--workers", type=int, metavar="N", help="Processes; default: one for each core.")
 @output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-def render(quiet: bool, size: str, **options: Any) -> None:
+def render(quiet: bool, size: str, assets: Path | None, **options: Any) -> None:
     """Photograph synthetic people into a folder.
 
     Each person gets a folder with photos, their IUV and alpha, and a JSON description; pairs.csv
@@ -127,11 +140,14 @@ def render(quiet: bool, size: str, **options: Any) -> None:
     \b
     mt people render --count 100 --out people/
     mt people render --count 20 --views 4 --size 512x512 --framing upper --out heads/
+    mt people render --count 100 --assets makehuman/ --free 1 --out free/
     """
-    from motion_transfer.people import AlbumOptions, write_album
+    from motion_transfer.people import AlbumOptions, find_assets, load_assets, write_album
 
-    settings = AlbumOptions(size=parse_size(size), **options)
-    prepare_body_model(quiet)
+    settings = AlbumOptions(size=parse_size(size), assets=find_assets(assets), **options)
+    if settings.assets:
+        load_assets(settings.assets)  # what is wrong with them is said at once
+    prepare_body_model(quiet, settings.assets)
     with CountBar("photographing", unit="person", total=settings.count, quiet=quiet) as bar:
         added = write_album(settings, bar.advance)
     if not quiet:
@@ -140,10 +156,26 @@ def render(quiet: bool, size: str, **options: Any) -> None:
         click.echo(f"{settings.out}: {added} {who} added{there}, {settings.views} photos each")
 
 
-def prepare_body_model(quiet: bool) -> None:
-    """Let the body model compute its cache if it has none yet, and say so while it does."""
+def prepare_body_model(quiet: bool, assets: Path | None = None) -> None:
+    """Let the body model compute its cache if it has none yet, and say so while it does.
+
+    Args:
+        assets: Of free people, whose garments need more of it.
+    Raises: InputError for assets that cannot be used.
+    """
     from motion_transfer.people import FIRST_USE, is_cached, load_body_model
 
     if not is_cached():
         with long_wait(FIRST_USE, quiet=quiet):
             load_body_model()
+    if assets:
+        from motion_transfer.people import (
+            HELPERS_FIRST_USE,
+            are_helpers_cached,
+            load_assets,
+            load_helpers,
+        )
+
+        if not are_helpers_cached():
+            with long_wait(HELPERS_FIRST_USE, quiet=quiet):
+                load_helpers(load_assets(assets))

@@ -155,7 +155,9 @@ def _prepare(planned: Any, progress: Progress, *, quiet: bool) -> Any:
 
     if planned.config.data.source == PEOPLE:
         require_extra("people")
-        prepare_body_model(quiet)
+        from motion_transfer.people import find_assets
+
+        prepare_body_model(quiet, find_assets(planned.config.data.assets))
     with (
         CountBar("photographing", unit="person", quiet=quiet) as people,
         CountBar("looking at the pairs", unit="picture", quiet=quiet) as pictures,

@@ -33,16 +33,24 @@ if TYPE_CHECKING:
     from motion_transfer.people.figure.camera import Camera
     from motion_transfer.people.figure.mesh import PosedBody
     from motion_transfer.people.figure.rasterise import Triangles, depths, rasterise
+    from motion_transfer.people.free.assets import check_share, find_assets, load_assets
+    from motion_transfer.people.free.binding import (
+        HELPERS_FIRST_USE,
+        are_helpers_cached,
+        load_helpers,
+    )
+    from motion_transfer.people.free.person import FreePerson
     from motion_transfer.people.person import DressedPerson, Person, sample_person
     from motion_transfer.people.photo import PersonPhoto, Shot, sample_shot
     from motion_transfer.people.picture.iuv_noise import IuvNoise
 
 __all__ = [
-    "FIRST_USE", "SCHEME", "AlbumOptions", "Body", "BodyModel", "Camera", "DressedPerson",
-    "IuvNoise", "MotionDriver", "MotionOptions", "PeopleDataset", "PeopleStream", "Person",
-    "PersonPhoto", "PosedBody", "Shape", "Shot", "Split", "Triangles", "check_motion", "depths",
-    "is_cached", "is_motion", "load_body_model", "open_motion", "rasterise", "record_motion",
-    "sample_person", "sample_shot", "write_album",
+    "FIRST_USE", "HELPERS_FIRST_USE", "SCHEME", "AlbumOptions", "Body", "BodyModel", "Camera",
+    "DressedPerson", "FreePerson", "IuvNoise", "MotionDriver", "MotionOptions", "PeopleDataset",
+    "PeopleStream", "Person", "PersonPhoto", "PosedBody", "Shape", "Shot", "Split", "Triangles",
+    "are_helpers_cached", "check_motion", "check_share", "depths", "find_assets", "is_cached",
+    "is_motion", "load_assets", "load_body_model", "load_helpers", "open_motion", "rasterise",
+    "record_motion", "sample_person", "sample_shot", "write_album",
 ]  # fmt: skip
 
 _NAMES_OF = {
@@ -53,6 +61,9 @@ _NAMES_OF = {
     "figure.camera": "Camera",
     "figure.mesh": "PosedBody",
     "figure.rasterise": "Triangles depths rasterise",
+    "free.assets": "check_share find_assets load_assets",
+    "free.binding": "HELPERS_FIRST_USE are_helpers_cached load_helpers",
+    "free.person": "FreePerson",
     "person": "DressedPerson Person sample_person",
     "photo": "PersonPhoto Shot sample_shot",
     "picture.iuv_noise": "IuvNoise",

@@ -24,6 +24,7 @@ from motion_transfer.media.pictures.photo import write_png
 from motion_transfer.media.publish import explain_disk_errors, publish
 from motion_transfer.people.dataset import PeopleStream, Split, check_numbering
 from motion_transfer.people.figure.camera import Framing, check_size
+from motion_transfer.people.free.assets import check_share, load_assets
 from motion_transfer.people.picture.iuv_noise import IuvNoise
 from motion_transfer.version import __version__
 
@@ -42,6 +43,8 @@ class AlbumOptions:
         size: (width, height) in px.
         noise: Share of the photos whose IUV gets DensePose's faults, 0 to 1.
         framing: What the photos show of the body; None: mixed.
+        assets: Folder of MakeHuman's assets, which free people wear; None: there are none of them.
+        free_share: Of free people among all, 0 to 1; None: a half where there are assets.
         workers: Processes; None: one for each core. Never changes what is written.
     Raises: InputError for a value out of its range.
     """
@@ -54,6 +57,8 @@ class AlbumOptions:
     size: tuple[int, int] = (256, 256)
     noise: float = 0.0
     framing: Framing | None = None
+    assets: Path | None = None
+    free_share: float | None = None
     workers: int | None = None
 
     def __post_init__(self) -> None:
@@ -65,12 +70,16 @@ class AlbumOptions:
         if not 0 <= self.noise <= 1:
             raise InputError(f"noise is {self.noise}; it is a share of the photos, 0 to 1")
         check_size(self.size, 32, LONGEST_SIDE)
+        check_share(self.free_share, self.assets)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What decides a person's bytes, for JSON."""
-        left_out = ("out", "count", "workers")
+        """What decides a person's bytes, for JSON. Raises: InputError for unusable assets."""
+        left_out = ("out", "count", "workers", "assets", "free_share")
         kept = {name: value for name, value in asdict(self).items() if name not in left_out}
+        if self.assets:  # what is in the folder counts, not where it lies
+            kept["assets"] = load_assets(self.assets).digest
+            kept["free_share"] = check_share(self.free_share, self.assets)
         return {"motion-transfer": __version__, **kept, "size": list(self.size)}
 
 
@@ -101,6 +110,8 @@ def _open_photographer(options: AlbumOptions) -> MakeItem:
         noise=IuvNoise.densepose() if options.noise else None,
         noisy_share=options.noise,
         framing=options.framing,
+        assets=options.assets,
+        free_share=options.free_share,
     )
     return partial(_photograph, options, people)
 
@@ -119,7 +130,10 @@ def _photograph(options: AlbumOptions, people: PeopleStream, number: int) -> Non
             write_png(folder / f"{view}_IUV.png", photo.iuv[..., ::-1])
             write_png(folder / f"{view}_alpha.png", photo.alpha)
             shots.append({**shot.description(), "camera": asdict(photo.camera)})
-        description = {"number": number, "person": dressed.person.description(), "shots": shots}
+        person = dressed.person.description()
+        if options.assets:  # where there are two kinds, each says which it is
+            person = {"kind": "painted", **person}
+        description = {"number": number, "person": person, "shots": shots}
         (folder / "person.json").write_text(json.dumps(description, indent=1) + "\n")
         folder.chmod(0o755)  # mkdtemp keeps others out
         publish(folder, final)

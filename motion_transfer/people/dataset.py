@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,6 +13,8 @@ from torch.utils.data import Dataset
 from motion_transfer.errors import InputError
 from motion_transfer.people.figure.body import load_body_model, one_thread
 from motion_transfer.people.figure.camera import Framing
+from motion_transfer.people.free.assets import check_share, load_assets
+from motion_transfer.people.free.person import FreePerson, sample_free_person
 from motion_transfer.people.person import DressedPerson, Person, sample_person
 from motion_transfer.people.photo import PersonPhoto, Shot, sample_shot, take_photo
 from motion_transfer.people.picture.iuv_noise import IuvNoise
@@ -37,6 +40,9 @@ class PeopleStream:
         noise: Faults of DensePose to put into the IUV; None: exact.
         noisy_share: The share of the photos that get them.
         framing: What the photos show of the body; None: mixed.
+        assets: Folder of MakeHuman's assets, which free people wear; None: there are none of them.
+        free_share: Of free people among all, 0 to 1; None: a half where there are assets.
+    Raises: InputError for assets that cannot be used, or a share without them.
     """
 
     def __init__(
@@ -48,16 +54,26 @@ class PeopleStream:
         noise: IuvNoise | None = None,
         noisy_share: float = 1.0,
         framing: Framing | None = None,
+        assets: Path | None = None,
+        free_share: float | None = None,
     ) -> None:
         check_numbering(seed, split)
+        self._free_share = check_share(free_share, assets)
+        self._assets = load_assets(assets) if assets else None
         self.size = size
         self._entropy = (seed, SPLITS.index(split))
+        self._held_out = split == "held-out"
         self._noise, self._noisy_share = noise, noisy_share
         self._framing: Framing | None = framing
         self._model = load_body_model()
 
-    def person(self, number: int) -> Person:
+    def person(self, number: int) -> Person | FreePerson:
         """Sample who has that number."""
+        if self._assets:
+            # a stream of its own: whoever is no free person is who would have been without assets
+            free = np.random.default_rng((*self._entropy, number, 0, 1))
+            if free.random() < self._free_share:
+                return sample_free_person(free, self._assets, held_out=self._held_out)
         return sample_person(self._random(number, 0))
 
     def shot(self, number: int, view: int) -> Shot:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -35,6 +35,30 @@ class Person:
     def description(self) -> dict[str, Any]:
         """Describe the person in plain numbers, words and lists, for JSON."""
         return asdict(self)
+
+    def pieces(self, body: Body, model: BodyModel) -> list[Piece]:
+        """Make skin, garments and hair at rest on a body of that shape; the skin comes first."""
+        skin, *rest = skin_pieces(self.face, body, model)
+        dressed = DressedBody(self.outfit, body, body_surface(model))
+        covered = replace(skin, keep=np.minimum(skin.keep, dressed.keep))
+        return [covered, *rest, *dressed.pieces, *hair_pieces(self.hair, body, model)]
+
+
+class Somebody(Protocol):
+    """Who can be dressed and photographed: a `Person`, or one made otherwise."""
+
+    @property
+    def shape(self) -> Shape:
+        """The body's build."""
+        ...
+
+    def description(self) -> dict[str, Any]:
+        """Describe the person in plain numbers, words and lists, for JSON."""
+        ...
+
+    def pieces(self, body: Body, model: BodyModel) -> list[Piece]:
+        """Make skin, garments and hair at rest on a body of that shape; the skin comes first."""
+        ...
 
 
 def sample_person(rng: np.random.Generator) -> Person:
@@ -72,7 +96,8 @@ def sample_shape(rng: np.random.Generator) -> Shape:
     )
 
 
-_body_surface = lru_cache(maxsize=1)(BodySurface)  # once for all people of a model
+body_surface = lru_cache(maxsize=1)(BodySurface)
+"""Fields over the skin, once for all people of a model."""
 
 
 class DressedPerson:
@@ -85,16 +110,12 @@ class DressedPerson:
         scene: The pieces, ready to be drawn.
     """
 
-    def __init__(self, person: Person, model: BodyModel) -> None:
+    def __init__(self, person: Somebody, model: BodyModel) -> None:
         self.person = person
         self.body: Body = model.body(person.shape)
         self.model = model
         self._capsules = Capsules(model, self.body)
-        skin, *rest = skin_pieces(person.face, self.body, model)
-        dressed = DressedBody(person.outfit, self.body, _body_surface(model))
-        covered = replace(skin, keep=np.minimum(skin.keep, dressed.keep))
-        hair = hair_pieces(person.hair, self.body, model)
-        self.pieces: list[Piece] = [covered, *rest, *dressed.pieces, *hair]
+        self.pieces = person.pieces(self.body, model)
         self.scene = Scene(self.pieces)
 
     def posed(self, pose: Pose) -> PosedBody:

@@ -125,6 +125,21 @@ class DataSettings:
         default="",
         metavar="DIR",
     )
+    assets: str = option(
+        "--assets",
+        "Data",
+        "Folder of MakeHuman's assets: people in photographed clothes; else MT_ASSETS.",
+        default="",
+        metavar="DIR",
+    )
+    free_share: Share = option(
+        "--free",
+        "Data",
+        "Share of people who wear them; default 0.5.",
+        kind="number",
+        default=0.5,
+        metavar="SHARE",
+    )
     moments: Count = 8
     skip_broken: bool = option(
         "--skip-broken", "Data", "Leave out pairs with a problem.", kind="flag", default=False

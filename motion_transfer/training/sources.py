@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from pathlib import Path
 
@@ -16,6 +16,9 @@ from motion_transfer.people import (
     IuvNoise,
     PeopleStream,
     Split,
+    check_share,
+    find_assets,
+    load_assets,
     write_album,
 )
 from motion_transfer.training.clips import IUV_ENDINGS, ClipFrame, list_files, open_clip_pairs
@@ -37,6 +40,7 @@ SOURCES_EACH = 4
 """How many other photos of a person each photo is the target of."""
 
 ENOUGH = 2**31  # more pairs than any run takes
+FREE_SHARE = DataSettings.free_share
 HELD_OUT_SEED, HELD_OUT_SIZE = 2020, (256, 256)
 DRAWN_BY = ("anny", "warp-lang", "numpy", "opencv-contrib-python-headless")
 """Packages whose versions decide, with ours, what people look like."""
@@ -136,9 +140,16 @@ def _open_people(
     settings: DataSettings, run: Path, seed: int, photographed: Done, checked: Done
 ) -> TrainingData:
     size = (settings.size_px, settings.size_px)
+    assets = find_assets(settings.assets)
+    # the default share says nothing where there are no assets, any other one is a slip
+    share = None if settings.free_share == FREE_SHARE else settings.free_share
+    share = check_share(share, assets)
+    among = f", {share:.0%} of them in photographed clothes" if assets else ""
     if settings.people == 0:
-        pairs = StreamedPairs(seed=seed, size=size, noise=settings.noise)
-        return TrainingData(pairs, "ever new synthetic people", repr(pairs))
+        pairs = StreamedPairs(
+            seed=seed, size=size, noise=settings.noise, assets=assets, free_share=share
+        )
+        return TrainingData(pairs, f"ever new synthetic people{among}", pairs.digest)
     folder = Path(settings.people_cache) if settings.people_cache else run / "people"
     options = AlbumOptions(
         out=folder,
@@ -147,6 +158,8 @@ def _open_people(
         seed=settings.people_seed,
         size=size,
         noise=settings.noise,
+        assets=assets,
+        free_share=share if assets else None,
     )
     write_album(options, lambda count: photographed(count, settings.people))
     pairs = open_pairs(folder / "pairs.csv", thorough=False, done=checked)
@@ -156,20 +169,34 @@ def _open_people(
             f"{folder} holds {found} people, but {settings.people} are asked for; train on all of"
             f" them with --people {found}, or name another --people-cache"
         )
-    return _describe(pairs, f"{settings.people} synthetic people, {settings.views} photos each")
+    words = f"{settings.people} synthetic people, {settings.views} photos each{among}"
+    return _describe(pairs, words)
 
 
-def held_out_pairs(count: int) -> PairList:
-    """Make the built-in set for evaluation: people of the split that training never draws from.
+def held_out_pairs(count: int, assets: Path | None = None) -> PairList:
+    """Make a built-in set for evaluation: people of the split that training never draws from.
 
     Its digest stands for the pixels without drawing them: everything follows from the seed, the
-    count and the versions of what draws.
-    Raises: InputError without the extra.
+    count, the versions of what draws, and the assets.
+
+    Args:
+        assets: Whose free people the set consists of; None: it is of painted ones.
+    Raises: InputError without the extra, or for assets that cannot be used.
     """
-    people = StreamedPairs(seed=HELD_OUT_SEED, size=HELD_OUT_SIZE, noise=0.0, split="held-out")
+    people = StreamedPairs(
+        seed=HELD_OUT_SEED,
+        size=HELD_OUT_SIZE,
+        noise=0.0,
+        split="held-out",
+        assets=assets,
+        free_share=1.0 if assets else 0.0,
+    )
     made_of = [HELD_OUT_SEED, HELD_OUT_SIZE, count, __version__, *map(package_version, DRAWN_BY)]
+    if assets:
+        made_of.append(load_assets(assets).digest)
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
-    return PairList("people (held-out)", [people[number] for number in range(count)], digest)
+    name = "free people" if assets else "people"
+    return PairList(f"{name} (held-out)", [people[number] for number in range(count)], digest)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,6 +208,8 @@ class StreamedPairs:
     Attributes:
         size: (width, height) in px.
         noise: The share of the photos whose IUV has the faults of DensePose's.
+        assets: Folder of MakeHuman's, which free people wear.
+        free_share: Of free people among all.
     """
 
     seed: int
@@ -188,9 +217,20 @@ class StreamedPairs:
     noise: float
     split: Split = "train"
     endless: bool = True
+    assets: Path | None = field(default=None, repr=False)
+    free_share: float = field(default=0.0, repr=False)
 
     def __post_init__(self) -> None:
         require_extra("people")
+        if self.assets:
+            load_assets(self.assets)  # what is wrong with them is said before anything is drawn
+
+    @property
+    def digest(self) -> str:
+        """What decides the pairs; without assets as it was before there were any."""
+        if self.assets is None:
+            return repr(self)
+        return f"{self!r}, {self.free_share} of {load_assets(self.assets).digest}"
 
     def __len__(self) -> int:
         return ENOUGH
@@ -229,6 +269,8 @@ def _stream(people: StreamedPairs) -> PeopleStream:
         size=people.size,
         noise=noise,
         noisy_share=people.noise,
+        assets=people.assets,
+        free_share=people.free_share if people.assets else None,
     )
 
 

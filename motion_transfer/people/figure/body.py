@@ -211,7 +211,7 @@ def load_body_model() -> BodyModel:
     Raises: InputError with the command that installs the extra, where it is missing.
     """
     require_extra("people")
-    folder = _cache_folder()
+    folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".motion-transfer.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -225,10 +225,10 @@ def is_cached() -> bool:
     """
     require_extra("people")
     # three stages are saved one by one; the last one is there only when all are
-    return any(_cache_folder().glob("v*/build_compact_model_data_*"))
+    return any(cache_folder().glob("v*/build_compact_model_data_*"))
 
 
-def _cache_folder() -> Path:
+def cache_folder() -> Path:
     from anny.paths import get_anny_cache_path
 
     return Path(get_anny_cache_path())

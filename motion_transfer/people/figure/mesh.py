@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from motion_transfer.people.figure.body import Body, Faces, Points, SkinWeights, Transforms
+from motion_transfer.people.figure.picture import Overlay
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Material:
         sharpness: Exponent of the highlight; about 8 satin and skin, 60 leather.
         translucency: How far light wraps around, 0 (cloth) .. 1; skin about 0.3.
         sheen_along_v: Highlights stretch across v, as on strands of hair that run along v.
+        overlay: A photographed surface in place of the texture.
     """
 
     texture: Float32[np.ndarray, "H W 4"]
@@ -35,6 +37,7 @@ class Material:
     sharpness: float = 20.0
     translucency: float = 0.0
     sheen_along_v: bool = False
+    overlay: Overlay | None = None
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float32, UInt8, UInt64
 from motion_transfer.people.figure.body import Points
 from motion_transfer.people.figure.camera import Camera
 from motion_transfer.people.figure.mesh import Piece
+from motion_transfer.people.figure.picture import Picture
 from motion_transfer.people.figure.rasterise import (
     EMPTY,
     Triangles,
@@ -26,8 +27,10 @@ from motion_transfer.people.picture.light import Light
 from motion_transfer.people.picture.shade_kernels import (
     LightInput,
     MaterialInput,
+    PictureInput,
     add_normals,
     develop_pixels,
+    fill_cut_outs,
     shade_samples,
 )
 
@@ -77,11 +80,20 @@ class Scene:
     def __init__(self, pieces: Sequence[Piece]) -> None:
         faces = [len(piece.faces) for piece in pieces]
         first = np.cumsum([0, *(len(piece.points) for piece in pieces)], dtype=np.int32)
+        cut = [bool(p.material.overlay and p.material.overlay.cut_out) for p in pieces]
         self.triangles = Triangles(
             np.concatenate([piece.faces + n for piece, n in zip(pieces, first, strict=False)]),
-            np.concatenate([piece.keep for piece in pieces]).astype(np.float32),
+            np.concatenate(
+                # what an alpha cuts out is left to a kernel of its own
+                [
+                    np.full_like(p.keep, -1) if own else p.keep
+                    for p, own in zip(pieces, cut, strict=True)
+                ]
+            ).astype(np.float32),
             np.repeat(np.array([not piece.two_sided for piece in pieces], np.uint8), faces),
         )
+        self._cut_out = np.repeat(np.array(cut), faces)
+        self._cut_outs = np.flatnonzero(self._cut_out).astype(np.int32)
         # kernels take no lists: texels of all textures lie one after the other
         textures = [piece.material.texture.reshape(-1, 4) for piece in pieces]
         texels = np.cumsum([0, *(len(texture) for texture in textures)])
@@ -101,11 +113,11 @@ class Scene:
         """
         fine = camera.scaled(SAMPLES)
         screen = fine.project(points)
-        nearest = rasterise(screen, self.triangles, fine.width, fine.height)
-        shadow_map, lamp = _light_input(light, camera, self.triangles, points)
-        seen = np.not_equal(nearest, EMPTY)
+        nearest = self._nearest(screen, fine.width, fine.height)
+        shadow_map, lamp = self._light_input(light, camera, points)
+        seen = np.not_equal(nearest, EMPTY).reshape(fine.height, fine.width)
         # only samples at which something is seen are shaded
-        share = sample_shares(seen.reshape(fine.height, fine.width))
+        share = sample_shares(seen, self._strands(nearest).reshape(seen.shape))
         sample = np.flatnonzero(share).astype(np.int32)
         out = wp.zeros((camera.height, camera.width), dtype=wp.vec4, device="cpu")
         inputs = [
@@ -125,17 +137,73 @@ class Scene:
         wp.launch(shade_samples, len(sample), inputs=inputs, outputs=[out], device="cpu")
         return Shading(out.numpy())
 
+    def _nearest(self, screen: Points, width: int, height: int) -> UInt64[np.ndarray, " H*W"]:
+        """Find what each place sees first, cut-outs included; see `rasterise`."""
+        nearest = rasterise(screen, self.triangles, width, height)
+        if len(self._cut_outs):
+            corner_uv, piece, materials, _ = self._arrays
+            inputs = [
+                share_array(self._cut_outs, wp.int32),
+                share_array(screen, wp.vec3),
+                self.triangles.arrays[0],
+                corner_uv,
+                piece,
+                materials,
+                width,
+                height,
+            ]
+            outputs = [share_array(nearest, wp.uint64)]
+            wp.launch(
+                fill_cut_outs, len(self._cut_outs), inputs=inputs, outputs=outputs, device="cpu"
+            )
+        return nearest
 
-def sample_shares(seen: Bool[np.ndarray, "SH SW"]) -> Float32[np.ndarray, " SH*SW"]:
+    def _strands(self, nearest: UInt64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+        """Tell where a cut-out is seen."""
+        if not len(self._cut_outs):
+            return np.zeros(len(nearest), bool)
+        ids = triangle_ids(nearest)
+        return (ids >= 0) & self._cut_out[ids]
+
+    def _light_input(
+        self, light: Light | None, camera: Camera, points: Points
+    ) -> tuple[Float32[np.ndarray, "S S"], Any]:
+        """Make the shadow map (depth from the key lamp) and all that shading needs of the light."""
+        made = LightInput()
+        made.camera = wp.vec3(*camera.position)
+        made.lit = int(light is not None)
+        if light is None:
+            return np.zeros((1, 1), np.float32), made
+        black = (0.0, 0.0, 0.0)  # kernels take three lamps, whether they are lit or not
+        lamps = [*light.lamps, *[None] * 3][:3]
+        made.toward = wp.mat33(*[x for lamp in lamps for x in (lamp.toward if lamp else black)])
+        made.colour = wp.mat33(*[x for lamp in lamps for x in (lamp.colour if lamp else black)])
+        made.lamps = len(light.lamps)
+        made.sky, made.ground = wp.vec3(*light.sky), wp.vec3(*light.ground)
+
+        rows = shadow_rows(light, points)
+        made.shadow_x, made.shadow_y, made.shadow_z = (wp.vec4(*row) for row in rows)
+        made.softness_px = light.softness_metres * float(np.linalg.norm(rows[0, :3]))
+        placed = points @ rows[:, :3].T + rows[:, 3]
+        seen = self._nearest(placed, SHADOW_SIZE, SHADOW_SIZE)
+        shadow = np.where(seen == EMPTY, np.float32(1e9), depths(seen))  # nothing is in the way
+        return shadow.reshape(SHADOW_SIZE, SHADOW_SIZE), made
+
+
+def sample_shares(
+    seen: Bool[np.ndarray, "SH SW"], strands: Bool[np.ndarray, "SH SW"]
+) -> Float32[np.ndarray, " SH*SW"]:
     """Weigh how much each sample counts for its pixel.
 
     Samples of a pixel count alike, so that the outline is as fine as they are; but inside a person
-    those on the diagonal do for all, which halves the work.
+    those on the diagonal do for all, which halves the work, unless a pixel has strands in it.
     """
     height, width = (side // SAMPLES for side in seen.shape)
     cells = seen.reshape(height, SAMPLES, width, SAMPLES)
     share = cells * np.float32(1 / SAMPLES**2)
     inside = np.all(cells, axis=(1, 3), keepdims=True)
+    if strands.any():
+        inside &= ~np.any(strands.reshape(cells.shape), axis=(1, 3), keepdims=True)
     diagonal = np.eye(SAMPLES, dtype=np.float32)[None, :, None, :] / SAMPLES
     return np.where(inside, diagonal, share).ravel()
 
@@ -158,32 +226,21 @@ def _material(piece: Piece, first_texel: int) -> Any:
     made.sharpness = material.sharpness
     made.translucency = material.translucency
     made.sheen_along_v = int(material.sheen_along_v)
+    if (overlay := material.overlay) is not None:
+        made.overlaid = 1
+        made.picture, made.normals = _picture(overlay.picture), _picture(overlay.normals)
+        made.gain, made.tint = wp.vec3(*overlay.gain), wp.vec4(*overlay.tint, overlay.tint_share)
+        made.mean, made.contrast = overlay.mean, overlay.contrast
     return made
 
 
-def _light_input(
-    light: Light | None, camera: Camera, triangles: Triangles, points: Points
-) -> tuple[Float32[np.ndarray, "S S"], Any]:
-    """Make the shadow map (depth from the key lamp), and all that shading needs of the light."""
-    made = LightInput()
-    made.camera = wp.vec3(*camera.position)
-    made.lit = int(light is not None)
-    if light is None:
-        return np.zeros((1, 1), np.float32), made
-    black = (0.0, 0.0, 0.0)  # kernels take three lamps, whether they are lit or not
-    lamps = [*light.lamps, *[None] * 3][:3]
-    made.toward = wp.mat33(*[x for lamp in lamps for x in (lamp.toward if lamp else black)])
-    made.colour = wp.mat33(*[x for lamp in lamps for x in (lamp.colour if lamp else black)])
-    made.lamps = len(light.lamps)
-    made.sky, made.ground = wp.vec3(*light.sky), wp.vec3(*light.ground)
-
-    rows = shadow_rows(light, points)
-    made.shadow_x, made.shadow_y, made.shadow_z = (wp.vec4(*row) for row in rows)
-    made.softness_px = light.softness_metres * float(np.linalg.norm(rows[0, :3]))
-    placed = points @ rows[:, :3].T + rows[:, 3]
-    seen = rasterise(placed, triangles, SHADOW_SIZE, SHADOW_SIZE)
-    shadow = np.where(seen == EMPTY, np.float32(1e9), depths(seen))  # nothing is in the way
-    return shadow.reshape(SHADOW_SIZE, SHADOW_SIZE), made
+def _picture(picture: Picture | None) -> Any:
+    """Share a picture's bytes with kernels; whoever holds the `Picture` keeps them alive."""
+    made = PictureInput()
+    if picture is not None:
+        made.texels = share_array(picture.texels, wp.vec4ub)
+        made.height, made.width = picture.height, picture.width
+    return made
 
 
 def shadow_rows(light: Light, points: Points) -> Float32[np.ndarray, "3 4"]:

@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 
 from motion_transfer.people.figure.body import start_warp
+from motion_transfer.people.figure.picture import LEVELS
 from motion_transfer.people.figure.raster_kernels import perspective_weights
 
 start_warp()
@@ -19,6 +20,9 @@ SCATTER_METRES = 0.1
 
 WRAP_TINT = wp.constant(wp.vec3(1.0, 0.55, 0.4))
 """Light that wraps around skin has passed through it, and comes out red."""
+
+LAST_SIZE = LEVELS - 1
+"""Of a picture's sizes, the smallest."""
 
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 SHADOW_DISC = wp.constant(
@@ -58,6 +62,15 @@ class LightInput:
 
 
 @wp.struct
+class PictureInput:
+    """A `Picture`; without texels where there is none."""
+
+    texels: wp.array(dtype=wp.vec4ub)
+    height: wp.int32
+    width: wp.int32
+
+
+@wp.struct
 class MaterialInput:
     """A `Material`, whose texels begin at `first_texel` of all textures."""
 
@@ -70,6 +83,13 @@ class MaterialInput:
     sharpness: wp.float32
     translucency: wp.float32
     sheen_along_v: wp.int32
+    overlaid: wp.int32  # the rest is an `Overlay`'s, and looked at only where this is 1
+    picture: PictureInput
+    normals: PictureInput
+    gain: wp.vec3
+    tint: wp.vec4  # its share last
+    mean: wp.float32
+    contrast: wp.float32
 
 
 @wp.kernel(enable_backward=False)
@@ -105,6 +125,124 @@ def _texel(texture: wp.array(dtype=wp.vec4), material: MaterialInput, u: float, 
     top = texture[upper + x0] * (1.0 - fx) + texture[upper + x1] * fx
     bottom = texture[lower + x0] * (1.0 - fx) + texture[lower + x1] * fx
     return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def _picture_size(picture: PictureInput, a: wp.vec2, b: wp.vec2, c: wp.vec2, area_px: float):
+    """Choose which of a picture's sizes has about one texel for each pixel of a triangle."""
+    across = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    texels = wp.abs(across) * float(picture.height * picture.width)
+    ratio = texels / wp.max(wp.abs(area_px), 1.0e-6)
+    size = wp.int32(0)
+    while size < LAST_SIZE and ratio >= 4.0:
+        ratio = ratio / 4.0
+        size += 1
+    return size
+
+
+@wp.func
+def _picture_at(picture: PictureInput, size: int, u: float, v: float):
+    """Look up one of a picture's sizes, bilinear, in [0, 1]; edges go on beyond it."""
+    first = wp.int32(0)
+    for larger in range(size):
+        first += (picture.height >> larger) * (picture.width >> larger)
+    height, width = picture.height >> size, picture.width >> size
+    x = wp.clamp(u * float(width) - 0.5, 0.0, float(width - 1))
+    y = wp.clamp(v * float(height) - 0.5, 0.0, float(height - 1))
+    x0, y0 = int(x), int(y)
+    fx, fy = x - float(x0), y - float(y0)
+    x1, y1 = wp.min(x0 + 1, width - 1), wp.min(y0 + 1, height - 1)
+    upper, lower = first + y0 * width, first + y1 * width
+    top = _unit(picture.texels[upper + x0]) * (1.0 - fx) + _unit(picture.texels[upper + x1]) * fx
+    bottom = _unit(picture.texels[lower + x0]) * (1.0 - fx) + _unit(picture.texels[lower + x1]) * fx
+    return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def _unit(texel: wp.vec4ub):
+    scale = 1.0 / 255.0
+    return wp.vec4(
+        float(texel[0]) * scale,
+        float(texel[1]) * scale,
+        float(texel[2]) * scale,
+        float(texel[3]) * scale,
+    )
+
+
+@wp.func
+def _overlay_albedo(material: MaterialInput, seen: wp.vec4):
+    """Find the linear colour of a picture's texel, tinted as the overlay says."""
+    grey = (seen[0] + seen[1] + seen[2]) / 3.0
+    relative = wp.clamp(1.0 + (grey / material.mean - 1.0) * material.contrast, 0.0, 2.5)
+    share = material.tint[3]
+    out = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(3):
+        mixed = seen[k] * (1.0 - share) + material.tint[k] * relative * share
+        # no cloth is whiter than 0.95, and sRGB's curve is near enough to this power
+        out[k] = wp.pow(wp.clamp(mixed * material.gain[k], 0.0, 0.95), 2.2)
+    return out
+
+
+@wp.func
+def _threshold(row: int, column: int, face: int):
+    """Find the alpha from which on a sample sees a cut-out surface, in (0, 1).
+
+    The four samples of a pixel have thresholds a quarter apart, the two on a diagonal one half, so
+    that a pixel shows its share of a fine strand; where in its quarter each lies, and which sample
+    has which, differs by pixel and triangle, so that layers of strands do not hide each other.
+    """
+    spot = (row // 2) * 7919 + (column // 2) * 104729 + face * 15485863
+    mixed = (spot ^ (spot >> 13)) * 1274126177
+    mixed = mixed ^ (mixed >> 16)
+    order = (row % 2) * 2 + (column % 2)  # the diagonal: 0 and 3
+    quarter = (wp.where(order == 3, 2, wp.where(order == 2, 3, order)) + (mixed & 3)) % 4
+    return (float(quarter) + (float((mixed >> 2) & 255) + 0.5) / 256.0) / 4.0
+
+
+@wp.kernel(enable_backward=False)
+def fill_cut_outs(
+    chosen: wp.array(dtype=wp.int32),
+    screen: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    corner_uv: wp.array2d(dtype=wp.vec2),
+    piece: wp.array(dtype=wp.uint8),
+    materials: wp.array(dtype=MaterialInput),
+    width: wp.int32,
+    height: wp.int32,
+    nearest: wp.array(dtype=wp.uint64),
+):
+    """Enter chosen triangles, seen from both sides, where their picture's alpha lets them be seen.
+
+    The result is that of `rasterise`, which leaves these triangles out.
+    """
+    f = chosen[wp.tid()]
+    corners = faces[f]
+    a, b, c = screen[corners[0]], screen[corners[1]], screen[corners[2]]
+    x0 = wp.max(int(wp.ceil(wp.min(a[0], wp.min(b[0], c[0])) - 0.5)), 0)
+    x1 = wp.min(int(wp.floor(wp.max(a[0], wp.max(b[0], c[0])) - 0.5)), width - 1)
+    y0 = wp.max(int(wp.ceil(wp.min(a[1], wp.min(b[1], c[1])) - 0.5)), 0)
+    y1 = wp.min(int(wp.floor(wp.max(a[1], wp.max(b[1], c[1])) - 0.5)), height - 1)
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    if x0 > x1 or y0 > y1 or area == 0.0 or wp.min(a[2], wp.min(b[2], c[2])) <= 0.0:
+        return
+    picture = materials[int(piece[f])].picture
+    ta, tb, tc = corner_uv[f, 0], corner_uv[f, 1], corner_uv[f, 2]
+    size = _picture_size(picture, ta, tb, tc, area)
+    for y in range(y0, y1 + 1):
+        py = float(y) + 0.5
+        for x in range(x0, x1 + 1):
+            px = float(x) + 0.5
+            wb = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / area
+            wc = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / area
+            if wb < 0.0 or wc < 0.0 or wb + wc > 1.0:
+                continue
+            w = perspective_weights(a, b, c, px, py)
+            uv = ta * w[0] + tb * w[1] + tc * w[2]
+            if _picture_at(picture, size, uv[0], uv[1])[3] < _threshold(y, x, f):
+                continue
+            z = 1.0 / ((1.0 - wb - wc) / a[2] + wb / b[2] + wc / c[2])
+            bits = wp.uint64(wp.cast(z, wp.uint32))
+            wp.atomic_min(nearest, y * width + x, (bits << wp.uint64(32)) | wp.uint64(f))
 
 
 @wp.func
@@ -198,6 +336,10 @@ def shade_samples(
     material = materials[int(piece[face])]
     texel = _texel(texture, material, uv[0], uv[1])
     albedo = wp.vec3(texel[0], texel[1], texel[2])
+    if material.overlaid != 0:
+        area_px = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
+        size = _picture_size(material.picture, ta, tb, tc, area_px)
+        albedo = _overlay_albedo(material, _picture_at(material.picture, size, uv[0], uv[1]))
     result = albedo
     if light.lit != 0:
         pa, pb, pc = points[corners[0]], points[corners[1]], points[corners[2]]
@@ -224,6 +366,16 @@ def shade_samples(
                 slope_u = (right[3] - texel[3]) / (du * material.size[0])
                 slope_v = (below[3] - texel[3]) / (dv * material.size[1])
                 normal = wp.normalize(normal - along_u * slope_u - along_v * slope_v)
+            if material.overlaid != 0 and material.normals.height > 0:
+                area_px = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
+                size = _picture_size(material.normals, ta, tb, tc, area_px)
+                bent = _picture_at(material.normals, size, uv[0], uv[1])
+                normal = wp.normalize(
+                    # no steeper than light could come to it
+                    normal * wp.max(bent[2] * 2.0 - 1.0, 0.2)
+                    + along_u * (bent[0] * 2.0 - 1.0)
+                    - along_v * (bent[1] * 2.0 - 1.0)
+                )
 
         # turned by a different angle at neighbouring samples, so that 8 taps make no bands
         spin = (column * 7 + row * 11) % 16

@@ -1,0 +1,1 @@
+"""Free people: photographed skins, clothes and hair of MakeHuman's on the project's own body."""

@@ -1,0 +1,263 @@
+"""What a free person looks like: which items, in which colours, and what of today's goes with them.
+
+Shares are chosen by eye, so that crowds look like those of streets and catalogues. Names that
+stand here are those of MakeHuman's items; a folder without them does without what they say.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+
+from motion_transfer.people.clothes.fabrics.colours import sample_palette
+from motion_transfer.people.clothes.outfits import sample_outfit
+from motion_transfer.people.clothes.wardrobe import Outfit
+from motion_transfer.people.figure.body import Shape
+from motion_transfer.people.free.assets import Assets, Colour, Item
+from motion_transfer.people.head.faces import Face, greyed, sample_face
+from motion_transfer.people.head.hair import Hair, sample_hair
+
+HELD_OUT_IN = 5
+"""One item in so many, by the checksum of its name, is never worn in training."""
+
+HELD_OUT_SHARE = 0.5
+"""How often a held-out person's skin, clothes, hair or shoes are drawn among those items alone."""
+
+DOLLS = ("creamy_female", "light_skin_female_bronze")
+"""Skins as even as a doll's."""
+
+OVER_EYES = ("short03", "short04")
+"""Hair that covers an eye."""
+
+UNDER_HATS = ("short04",)
+"""Hair that a hat fits over; it comes through with all other."""
+
+UNISEX = ("male_casualsuit02", "male_casualsuit03", "male_casualsuit04")
+"""Suits that women wear as well."""
+
+UNDYED = ("male_elegantsuit01",)
+"""Suits whose pieces have colours that belong together."""
+
+LIGHT: tuple[Colour, ...] = (
+    (0.96, 0.96, 0.95),
+    (0.93, 0.91, 0.87),
+    (0.90, 0.87, 0.80),
+    (0.86, 0.88, 0.90),
+    (0.90, 0.85, 0.83),
+    (0.82, 0.83, 0.82),
+)
+"""White, cream and pale cloth: large plain light clothes are the hardest to keep their shape."""
+
+LIGHT_SHARE = 0.2
+OUTFIT_SHARE = 0.4  # the project's own garments: twelve suits are few cuts
+GROWN_SHARE = 0.3  # its own hair, of which there are more styles than of photographed
+SKIRT_SHARE = 0.2  # of women in photographed clothes
+HAT_SHARE, BALD_SHARE = 0.06, 0.06
+AFRO_SHARE = 0.5  # of people of african types
+YOUNG, MIDDLE_AGED = 0.72, 0.82  # the ages below which a skin of that age is worn
+
+
+@dataclass(frozen=True)
+class Dye:
+    """A colour that a cloth's mean becomes, sRGB, and how much of it, 0..1."""
+
+    colour: Colour
+    share: float
+
+
+@dataclass(frozen=True)
+class Look:
+    """Everything of one free person but the build; JSON-able through `dataclasses.asdict`.
+
+    Attributes:
+        skin, eyes, brows, lashes, hair, hat: Names of items; eyes a picture's, which an eyeball
+            wears. None: none.
+        tone: Multiplies the skin's colours.
+        hair_colour: sRGB; brows have it, too.
+        hat_picture: A role of the hat's pictures.
+        clothes: Names of items.
+        upper, lower: What shirts and trousers are dyed; None: as they are.
+        face: Whose beard and glasses are worn; its colours are not seen.
+        outfit: The project's own garments, in place of clothes.
+        grown: The project's own hair, in place of an item's.
+    """
+
+    skin: str
+    tone: Colour
+    eyes: str
+    brows: str | None
+    lashes: str | None
+    hair_colour: Colour
+    hair: str | None
+    hat: str | None
+    hat_picture: str
+    clothes: tuple[str, ...]
+    upper: Dye | None
+    lower: Dye | None
+    face: Face
+    outfit: Outfit | None
+    grown: Hair | None
+
+
+def is_held_out(name: str) -> bool:
+    """Tell whether an item is kept from training, whatever the folder that holds it."""
+    return zlib.crc32(name.encode()) % HELD_OUT_IN == 0
+
+
+class _Closet:
+    """Draws items: of training without the held-out ones, else often among those alone."""
+
+    def __init__(self, rng: Generator, assets: Assets, held_out: bool) -> None:
+        self._rng, self._assets, self._held_out = rng, assets, held_out
+
+    def draw(self, items: Sequence[Item]) -> Item | None:
+        """Draw one; None where there is none. Where all are held out, training wears them."""
+        apart = [item for item in items if is_held_out(item.name)]
+        kept = [item for item in items if not is_held_out(item.name)]
+        often = self._rng.random() < HELD_OUT_SHARE
+        chosen = (apart if often and apart else items) if self._held_out else kept or items
+        return chosen[int(self._rng.integers(len(chosen)))] if chosen else None
+
+    def of(self, kind: str, sex: str | None = None) -> list[Item]:
+        items = self._assets.of(kind)
+        return [item for item in items if sex is None or item.sex in (sex, "any")]
+
+
+def sample_look(rng: Generator, shape: Shape, assets: Assets, *, held_out: bool) -> Look:
+    """Sample a look that goes with a body.
+
+    Args:
+        held_out: Whether the person is one of the split that nothing is trained on. Nobody in
+            training wears what `is_held_out`; people of that split often do, and the others of
+            theirs are in combinations of their own.
+    """
+    sex = "female" if shape.gender > 0.5 else "male"
+    closet = _Closet(rng, assets, held_out)
+    face = sample_face(rng, replace(shape, gender=float(sex == "female")))
+    skin = closet.draw(_fitting_skins(closet.of("skin"), shape, sex))
+    assert skin is not None  # a folder without skins is refused
+    light, warm = np.exp(rng.normal(0, 0.05)), rng.normal(0, 0.012)
+    own_hair = greyed(face.hair_colour, face.grey)
+    hair, hat = _hair(rng, closet, shape, sex)
+    grown = None
+    if hat is None and rng.random() < GROWN_SHARE:
+        grown = sample_hair(rng, shape, face)
+        hair = None
+    clothes, outfit = _clothes(rng, closet, sex), None
+    if not clothes or rng.random() < OUTFIT_SHARE:
+        clothes, outfit = (), sample_outfit(rng, replace(shape, gender=float(sex == "female")))
+    upper, lower = _dyes(rng, clothes)
+    hats = [role for role in (hat.pictures if hat else ()) if role.startswith("diffuse")]
+    return Look(
+        skin=skin.name,
+        tone=(float(light * (1 + warm)), float(light), float(light * (1 - warm))),
+        eyes=_eyes(rng, closet, face),
+        brows=_name(closet.draw(closet.of("eyebrows"))),
+        lashes=_lashes(closet, sex),
+        hair_colour=grown.colour if grown else own_hair,
+        hair=_name(hair),
+        hat=_name(hat),
+        hat_picture=hats[int(rng.integers(len(hats)))] if hats else "diffuse",
+        clothes=clothes,
+        upper=upper,
+        lower=lower,
+        face=face,
+        outfit=outfit,
+        grown=grown,
+    )
+
+
+def _name(item: Item | None) -> str | None:
+    return item.name if item else None
+
+
+def _fitting_skins(skins: Sequence[Item], shape: Shape, sex: str) -> list[Item]:
+    """Keep the skins of a body's sex, and of its origin and age as far as there are any."""
+    shares = {"african": shape.african, "asian": shape.asian, "caucasian": shape.caucasian}
+    origin = max(shares, key=lambda name: shares[name])
+    mixed = max(shares.values()) < 0.6 * sum(shares.values()) and origin != "african"
+    wanted = ("eurasian", origin) if mixed and shape.asian > 0.25 else (origin,)
+    age = "young" if shape.age < YOUNG else "middleage" if shape.age < MIDDLE_AGED else "old"
+    chosen = [skin for skin in skins if skin.name not in DOLLS] or list(skins)
+    for fits in (
+        lambda skin: skin.sex in (sex, "any"),
+        lambda skin: skin.origin in wanted,
+        lambda skin: skin.age == age,
+    ):
+        chosen = [skin for skin in chosen if fits(skin)] or chosen
+    return chosen
+
+
+def _eyes(rng: Generator, closet: _Closet, face: Face) -> str:
+    """Choose brown eyes, or the light ones that go with a face of light eyes."""
+    eyes = closet.of("eye texture")
+    brown = [item for item in eyes if item.name.startswith("brown")]
+    others = [item for item in eyes if item not in brown]
+    light = sum(face.iris) > 1.0
+    chosen = (others if light and others else brown) or eyes
+    return chosen[int(rng.integers(len(chosen)))].name
+
+
+def _lashes(closet: _Closet, sex: str) -> str | None:
+    lashes = closet.of("eyelashes")
+    return _name(closet.draw(lashes if sex == "female" else lashes[:1]))
+
+
+def _hair(
+    rng: Generator, closet: _Closet, shape: Shape, sex: str
+) -> tuple[Item | None, Item | None]:
+    """Choose hair, or none, and a hat where the hair allows for one."""
+    african = shape.african > max(shape.asian, shape.caucasian)
+    styles = closet.of("hair", sex)
+    afro = [item for item in styles if item.name.startswith("afro")]
+    # what covers an eye is left to one in ten
+    free = [item for item in styles if item not in afro and item.name not in OVER_EYES]
+    chosen = afro if african and afro and rng.random() < AFRO_SHARE else free
+    covering = [item for item in styles if item.name in OVER_EYES]
+    if not chosen or (covering and rng.random() < 0.1):
+        chosen = covering or styles
+    hair = closet.draw(chosen)
+    if sex == "male" and rng.random() < BALD_SHARE:
+        hair = None
+    hats = closet.of("hat")
+    if hats and rng.random() < HAT_SHARE:
+        fitting = [item for item in styles if item.name in UNDER_HATS]
+        hair = closet.draw(fitting) if sex == "male" and rng.random() < 0.6 else None
+        if hair or sex == "male":
+            return hair, closet.draw(hats)
+        hair = closet.draw(chosen)
+    return hair, None
+
+
+def _clothes(rng: Generator, closet: _Closet, sex: str) -> tuple[str, ...]:
+    """Choose a suit, or a top and a skirt, and shoes: whatever it is, no part of a body is nude."""
+    shoes = closet.draw(closet.of("shoes", sex))
+    suits = [item for item in closet.of("suit") if item.sex in (sex, "any")]
+    if sex == "female":
+        suits += [item for item in closet.of("suit") if item.name in UNISEX]
+    top, skirt = closet.draw(closet.of("top", sex)), closet.draw(closet.of("skirt", sex))
+    worn: list[Item | None] = [closet.draw(suits)]
+    if top and skirt and (worn[0] is None or rng.random() < SKIRT_SHARE):
+        worn = [top, skirt]
+    if None in worn or shoes is None:
+        return ()
+    return tuple(item.name for item in [*worn, shoes] if item)
+
+
+def _dyes(rng: Generator, clothes: Sequence[str]) -> tuple[Dye | None, Dye | None]:
+    """Choose colours for shirt and trousers, apart; now and then plain light cloth all over."""
+    light = rng.random() < LIGHT_SHARE
+    shades = [LIGHT[int(rng.integers(len(LIGHT)))] for _ in range(2)]
+    palette = sample_palette(rng, 2)
+    dyed = rng.random(2) < (0.8, 0.6)
+    if not clothes or clothes[0] in UNDYED:
+        return None, None
+    if light:
+        shades[1] = shades[0] if rng.random() < 0.5 else shades[1]
+        return Dye(shades[0], 0.97), Dye(shades[1], 0.97)
+    upper = Dye(palette[0], 0.92) if dyed[0] else None
+    return upper, Dye(palette[1], 0.85) if dyed[1] else None
