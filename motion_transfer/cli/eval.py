@@ -43,6 +43,7 @@ def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -
             --results CBI/ DSC/ -o table1/
     mt eval --clips fashion/ --weights a.safetensors -o videos/
     mt eval --protocol people --weights a.safetensors --renderer texture -o people/
+    mt eval --protocol free-people --assets makehuman/ --weights a.safetensors -o free/
     mt eval --compare table1/results.json later/results.json
     """
     if compare:
@@ -56,8 +57,8 @@ def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -
     from motion_transfer.evaluation.evaluate import evaluate
     from motion_transfer.evaluation.report import table
 
-    if options.protocol == "people":
-        prepare_body_model(quiet)
+    if options.protocol is not None:
+        prepare_body_model(quiet, options.protocol_assets)
     with (
         CountBar("looking at the pairs", unit="picture", quiet=quiet) as pictures,
         CountBar("scoring", unit="pair", quiet=quiet) as pairs,

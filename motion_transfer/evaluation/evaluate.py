@@ -120,7 +120,7 @@ def check_output(path: Path, *, force: bool) -> None:
 def open_pairs_of(options: EvaluationOptions, checked: Done) -> PairList:
     """Open the pairs that the options name, each looked at. Raises: InputError listing problems."""
     if options.protocol is not None:
-        return held_out_pairs(options.limit or HELD_OUT_PAIRS)
+        return held_out_pairs(options.limit or HELD_OUT_PAIRS, options.protocol_assets)
     common: dict[str, Any] = {
         "iuv_order": options.iuv_order,
         "limit": options.limit,

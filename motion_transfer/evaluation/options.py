@@ -15,6 +15,7 @@ from motion_transfer.option import REQUIRED, check_choices, option, parse_size
 if TYPE_CHECKING:
     from motion_transfer.evaluation.framing import Framing
 
+FREE_PEOPLE = "free-people"
 PAIRS = "Pairs (one of --pairs, --clips and --protocol)"
 METHODS = "Methods to compare (any number, of any kind)"
 PROTOCOL = "Protocol (numbers are comparable only where it is the same)"
@@ -46,9 +47,17 @@ class EvaluationOptions:
     protocol: str | None = option(
         "--protocol",
         PAIRS,
-        "The built-in set: synthetic people on whom nothing is ever trained; 500 unless --limit.",
-        choices=("people",),
-        metavar="[people]",
+        "A built-in set: synthetic people on whom nothing is ever trained, painted ones or those"
+        " in photographed clothes; 500 unless --limit.",
+        choices=("people", FREE_PEOPLE),
+        metavar="[people|free-people]",
+    )
+    assets: Path | None = option(
+        "--assets",
+        PAIRS,
+        "Folder of MakeHuman's assets, for free-people; else MT_ASSETS.",
+        kind="path",
+        metavar="DIR",
     )
     moments: int = option(
         "--moments",
@@ -162,7 +171,23 @@ class EvaluationOptions:
             value = getattr(self, name)
             if value is not None and value < 1:
                 raise InputError(f"{name} is {value}; it must be at least 1")
-        _ = self.framing
+        _ = self.framing, self.protocol_assets
+
+    @property
+    def protocol_assets(self) -> Path | None:
+        """The assets that the protocol's people wear; None: they wear none. Raises: InputError."""
+        if self.protocol != FREE_PEOPLE:
+            return None
+        from motion_transfer.people import find_assets, load_assets  # help has to be instant
+
+        assets = find_assets(self.assets)
+        if assets is None:
+            raise InputError(
+                f"protocol {FREE_PEOPLE} needs assets; name their folder with --assets DIR or"
+                " MT_ASSETS"
+            )
+        load_assets(assets)
+        return assets
 
     @property
     def framing(self) -> Framing:
