@@ -6,17 +6,19 @@ None counts all. Sums are in float64. Where a mask leaves nothing to count the r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
+from numpy.lib.stride_tricks import sliding_window_view
 from torch import Tensor
 
 from motion_transfer.drawing.person import COVERS, bounding_box, disc, occupancy
-from nhrr_core import extract_texture, load_uv_layout
+from nhrr_core import extract_texture, load_uv_layout, texture_coordinates
 
 Image = UInt8[np.ndarray, "H W 3"]
 Mask = Bool[np.ndarray, "H W"]
@@ -27,6 +29,10 @@ SSIM_SIGMA = 1.5
 SSIM_K1, SSIM_K2 = 0.01, 0.03
 MASK_GROWTH = 0.05  # of the person's height: hair and clothes reach beyond the IUV by about that
 FLICKER_TEXELS = 128  # side of the texture that flicker is measured in: a few pixels a texel
+SHOWN_TEXELS = 128  # likewise, where what a photo shows of a body is compared with another
+LATTICE_PERIODS = (2, 4, 8)  # px: what up-sampling two, four and eight times leaves behind
+LATTICE_WINDOW, LATTICE_STRIDE = 32, 8  # px: four of the longest periods; overlapping
+FLAT_LEVELS = 8.0  # rms of 255 around its plane, up to which a window counts as flat; by the eye
 
 
 def ssim(first: Image, second: Image, mask: Mask | None = None) -> float:
@@ -142,6 +148,68 @@ def flicker(
     return _mean(change, both)
 
 
+def flat_windows(reference: Image, mask: Mask) -> Int[np.ndarray, "N 2"]:
+    """Find the windows of 32 x 32 px inside the mask in which a picture is smooth.
+
+    Smooth is what a plane through its colours explains up to 8 levels of 255 (rms, mean of
+    channels): there, whatever repeats in another picture of the same is that one's own.
+
+    Returns: Row and column of each window's first pixel, multiples of 8 px.
+    """
+    inside = sliding_window_view(mask, (LATTICE_WINDOW, LATTICE_WINDOW))
+    corners = np.argwhere(inside[::LATTICE_STRIDE, ::LATTICE_STRIDE].all((2, 3))) * LATTICE_STRIDE
+    rest = _without_plane(_windows(reference, corners))
+    return corners[np.sqrt((rest**2).mean((2, 3))).mean(1) <= FLAT_LEVELS]
+
+
+def lattice_energy(image: Image, corners: Int[np.ndarray, "N 2"]) -> tuple[float, float, float]:
+    """Measure how strongly patterns of a period of 2, 4 and 8 px stand out, in levels^2 of 255.
+
+    Such lattices are what networks that up-sample leave behind ("checkerboard artifacts"; Odena et
+    al., Distill 2016). Of each window's power spectrum (Hann window, plane removed) the bins of
+    that period along x, along y, and along both count, less what the bins around them let expect:
+    their median over ln 2, the mean of noise with that median. A lattice of the form
+    a cos(2 pi x / p) has a^2 / 2 (p = 2: a^2); what is smooth and white noise have about 0, to
+    either side of it. The mean over windows and channels.
+
+    Args:
+        corners: Those of `flat_windows`; the picture has the reference's size.
+    Returns: A number for each of LATTICE_PERIODS, NaN where there is no window.
+    """
+    if not len(corners):
+        return (math.nan, math.nan, math.nan)
+    taper = np.hanning(LATTICE_WINDOW + 1)[:-1]
+    taper = np.outer(taper, taper)
+    rest = _without_plane(_windows(image, corners)) * taper
+    # a cosine's two bins together hold a^2 / 2, as its mean square does
+    power = np.abs(np.fft.fft2(rest)) ** 2 / taper.sum() ** 2
+    found = []
+    for period in LATTICE_PERIODS:
+        step = LATTICE_WINDOW // period
+        places = {0, step, LATTICE_WINDOW - step}
+        bins = [(row, column) for row in places for column in places if (row, column) != (0, 0)]
+        # not of the mean spectrum: it is single spectra of noise whose bins are so spread
+        found.append(sum((power[..., r, c] - _expected(power, r, c)).mean() for r, c in bins))
+    return found[0], found[1], found[2]
+
+
+def shown_pixels(source_iuv: Image, target_iuv: Image) -> Mask:
+    """Mark the pixels of the target's body whose place on the body the source shows.
+
+    The IUV images may differ in size. Places are texels of a texture of 128 x 128; a source shows
+    all of its own.
+    """
+    source, target = (
+        torch.from_numpy(np.ascontiguousarray(iuv)).permute(2, 0, 1)[None]
+        for iuv in (source_iuv, target_iuv)
+    )
+    charts = load_uv_layout().charts
+    _, visibility = extract_texture(source.float(), source, charts, SHOWN_TEXELS)
+    place = texture_coordinates(target, charts)
+    column, row = (place * SHOWN_TEXELS).long().clamp(0, SHOWN_TEXELS - 1).unbind(-1)
+    return ((visibility[0, 0, row, column] > 0) & (target[:, 0] > 0))[0].numpy()
+
+
 def frechet_distance(first: Float[np.ndarray, "N D"], second: Float[np.ndarray, "M D"]) -> float:
     """Measure the Fréchet distance of the normal distributions of two sets of feature vectors.
 
@@ -164,6 +232,32 @@ def frechet_distance(first: Float[np.ndarray, "N D"], second: Float[np.ndarray, 
     spread = sum((rows**2).sum() for rows in centred)
     distance = ((means[0] - means[1]) ** 2).sum() + spread - 2 * shared
     return max(0.0, float(distance))  # equal sets may end a rounding error below
+
+
+def _windows(image: Image, corners: Int[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 3 32 32"]:
+    windows = sliding_window_view(image, (LATTICE_WINDOW, LATTICE_WINDOW), axis=(0, 1))
+    return windows[corners[:, 0], corners[:, 1]].astype(np.float64)
+
+
+def _without_plane(windows: Float[np.ndarray, "N 3 S S"]) -> Float[np.ndarray, "N 3 S S"]:
+    """Subtract the plane of least squares: mean, and slope along x and y."""
+    ramp = np.arange(windows.shape[-1]) - (windows.shape[-1] - 1) / 2
+    rest = windows - windows.mean((2, 3), keepdims=True)
+    across = (rest.mean(2) @ ramp / (ramp @ ramp))[..., None, None] * ramp
+    down = (rest.mean(3) @ ramp / (ramp @ ramp))[..., None, None] * ramp[:, None]
+    return rest - across - down
+
+
+def _expected(power: Float[np.ndarray, "N 3 S S"], row: int, column: int) -> np.ndarray:
+    """The power of a bin as its neighbours tell it: those 2 and 3 bins away.
+
+    The nearest ones share a lattice's power, as a Hann window spreads it over three bins.
+    """
+    size, near = power.shape[-1], np.arange(-3, 4)
+    down, right = np.meshgrid(near, near, indexing="ij")
+    ring = np.maximum(np.abs(down), np.abs(right)) >= 2
+    around = power[..., (row + down[ring]) % size, (column + right[ring]) % size]
+    return np.median(around, axis=-1) / math.log(2)
 
 
 def _mean(values: Float[np.ndarray, "H W"], mask: Mask | None) -> float:

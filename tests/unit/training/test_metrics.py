@@ -14,13 +14,17 @@ from skimage.metrics import structural_similarity
 import motion_transfer
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.training.metrics import (
+    LATTICE_PERIODS,
     average_ssim,
     feature_distance,
+    flat_windows,
     flicker,
     frechet_distance,
     l1,
+    lattice_energy,
     person_mask,
     psnr,
+    shown_pixels,
     ssim,
     ssim_map,
 )
@@ -193,3 +197,65 @@ def test_the_mask_is_alpha_or_the_grown_iuv(studio) -> None:
     alpha[5:9, 5:9], alpha[20, 20] = 128, 127
     np.testing.assert_array_equal(person_mask(iuv, alpha), alpha == 128)
     assert not person_mask(np.zeros_like(iuv), None).any()
+
+
+def lattice(period: int, amplitude: float, *, across: bool, down: bool) -> np.ndarray:
+    """a cos(2 pi x / p), a cos(2 pi y / p), or their product, as H x W x 1."""
+    wave = np.cos(2 * np.pi * np.arange(160) / period)
+    flat = np.ones(160)
+    return amplitude * np.outer(wave if down else flat, wave if across else flat)[..., None]
+
+
+def shaded() -> np.ndarray:
+    """A smooth picture: a wide wave on a slope, another in each channel."""
+    y, x = np.mgrid[:160, :160]
+    return np.stack([110 + 30 * np.sin(x / 40 + y / 60), 90 + 0.3 * x, 140 - 0.2 * y], -1)
+
+
+def rounded(picture: np.ndarray) -> np.ndarray:
+    return picture.clip(0, 255).round().astype(np.uint8)
+
+
+ANYWHERE = flat_windows(np.full((160, 160, 3), 90, np.uint8), np.ones((160, 160), bool))
+
+
+@pytest.mark.parametrize(("across", "down"), [(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize("period", LATTICE_PERIODS)
+@pytest.mark.parametrize("amplitude", [3, 12])
+def test_a_lattice_has_its_mean_square(
+    period: int, amplitude: int, across: bool, down: bool
+) -> None:
+    added = lattice(period, amplitude, across=across, down=down)
+    found = lattice_energy(rounded(shaded() + added), ANYWHERE)
+    for other, energy in zip(LATTICE_PERIODS, found, strict=True):
+        wanted = (added**2).mean() if other == period else 0
+        assert energy == pytest.approx(wanted, rel=0.03, abs=0.05)
+
+
+def test_what_is_smooth_and_noise_have_no_lattice() -> None:
+    assert lattice_energy(rounded(shaded()), ANYWHERE) == pytest.approx((0, 0, 0), abs=0.01)
+    noise = noisy(rounded(shaded()), 10)  # 100 levels^2, all frequencies together
+    assert lattice_energy(noise, ANYWHERE) == pytest.approx((0, 0, 0), abs=0.3)
+    both = rounded(noise + lattice(4, 6, across=True, down=False))
+    assert lattice_energy(both, ANYWHERE)[1] == pytest.approx(18, abs=1)
+
+
+def test_lattices_are_looked_for_where_the_target_is_flat() -> None:
+    reference = rounded(shaded() + lattice(8, 40, across=True, down=False))
+    mask = np.zeros((160, 160), bool)
+    assert len(flat_windows(reference, mask)) == 0
+    assert np.isnan(lattice_energy(reference, flat_windows(reference, mask))).all()
+    reference[:, :80] = rounded(shaded())[:, :80]
+    mask[8:41, 8:] = True
+    # 33 rows hold windows at one multiple of 8 px
+    assert flat_windows(reference, mask).tolist() == [[8, column] for column in range(8, 49, 8)]
+
+
+def test_pixels_are_shown_where_the_source_has_their_texel(studio) -> None:
+    whole, half = studio.iuv(scale=2, size=(220, 180)), studio.iuv(parts=(2, 23))
+    shown = shown_pixels(half, whole)
+    known = np.isin(whole[..., 0], (2, 23))
+    assert shown[known].mean() > 0.95
+    assert not shown[whole[..., 0] == 0].any()
+    assert shown[(whole[..., 0] > 0) & ~known].mean() < 0.05
+    np.testing.assert_array_equal(shown_pixels(whole, whole), whole[..., 0] > 0)
