@@ -47,8 +47,11 @@ class ModelConfig:
             and clearance of the place that is nearest, and the distance to the outline
             (`signed_distance`). RenderNet's last convolution reads its input, too: what is as fine
             as a finger is lost in the layers before.
+        prior: FeatureNet reads a texture that is learned with it and is the same for everybody:
+            what people look like where a photo does not show them, in the face above all.
+        even: RenderNet's up-sampling can draw no checkerboard (`UpConvolution`).
     Source: the paper, Sec. 3 and 4.4; widths from Pix2PixHD's global generator (RenderNet) and
-        U-Net (FeatureNet). Departs from it: the last seven. `visibility_input` is on; those after
+        U-Net (FeatureNet). Departs from it: the last nine. `visibility_input` is on; those after
         it are off, and on in `lite`, so that networks learn in hours what to change instead of
         learning in days to copy.
     """
@@ -68,6 +71,8 @@ class ModelConfig:
     colour_margin: bool = False
     clearance: bool = False
     geometry: bool = False
+    prior: bool = False
+    even: bool = False
 
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
@@ -132,7 +137,7 @@ class ModelConfig:
     def feature_inputs(self) -> int:
         """Channels that FeatureNet reads: RGB, and what is known of each texel."""
         known = int(self.visibility_input) + int(self.prefilled)
-        return COLOUR_CHANNELS + known + POSITION_CHANNELS * self.geometry
+        return COLOUR_CHANNELS * (1 + self.prior) + known + POSITION_CHANNELS * self.geometry
 
     @property
     def feature_outputs(self) -> int:
@@ -168,5 +173,7 @@ PRESETS = {
         colour_margin=True,
         clearance=True,
         geometry=True,
+        prior=True,
+        even=True,
     ),
 }

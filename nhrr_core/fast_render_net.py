@@ -21,7 +21,7 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from nhrr_core.render_net import RenderNet, ResidualBlock
+from nhrr_core.render_net import RenderNet, ResidualBlock, UpConvolution
 from nhrr_core.winograd import TILE, transform_weight, winograd_convolution
 
 EPSILON = 1e-5  # of torch.nn.InstanceNorm2d
@@ -53,7 +53,7 @@ class FastRenderNet(nn.Module):
         if winograd is None:
             winograd = not torch.cpu._is_amx_tile_supported()
         plain = [layer for layer in net.layers if isinstance(layer, nn.Conv2d)]
-        up = [layer for layer in net.layers if isinstance(layer, nn.ConvTranspose2d)]
+        up = [layer for layer in net.layers if isinstance(layer, UpConvolution)]
         blocks = [layer.body for layer in net.layers if isinstance(layer, ResidualBlock)]
         inner = [layer for body in blocks for layer in body if isinstance(layer, nn.Conv2d)]
         self.shortcut = net.shortcut
@@ -129,13 +129,13 @@ class _Decoder(nn.Module):
     """
 
     def __init__(
-        self, convolutions: list[nn.ConvTranspose2d], last: nn.Conv2d, dtype: torch.dtype
+        self, convolutions: list[UpConvolution], last: nn.Conv2d, dtype: torch.dtype
     ) -> None:
         super().__init__()
         # the four pixels of a 2 x 2 block see the 7x7 filter at four places of an 8x8 window
         places = [F.pad(last.weight, (x, 1 - x, y, 1 - y)) for y in (0, 1) for x in (0, 1)]
         block = torch.stack(places, 1).flatten(0, 1)
-        self.weights = _constants([*(layer.weight for layer in convolutions), block], dtype)
+        self.weights = _constants([*(layer.kernel for layer in convolutions), block], dtype)
         bias = torch.zeros(len(last.weight)) if last.bias is None else last.bias
         self.bias = nn.Parameter(bias.detach().float().clone().view(-1, 1, 1), requires_grad=False)
 

@@ -23,8 +23,8 @@ class LossWeights:
     """The lambdas of the generator's loss.
 
     Raises: ConfigError if one is negative or not finite.
-    Source: the paper, Sec. 3.5. Departs from it: `alpha`, of the optional coverage channel, is this
-        project's.
+    Source: the paper, Sec. 3.5. Departs from it: `alpha`, of the optional coverage channel, and
+        `head`, the perceptual distance of the enlarged head, are this project's.
     """
 
     perceptual: float = 10.0
@@ -32,6 +32,7 @@ class LossWeights:
     identity: float = 5.0
     texture: float = 1.0
     alpha: float = 10.0
+    head: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):

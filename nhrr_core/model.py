@@ -76,6 +76,13 @@ class NeuralReRenderer(nn.Module):
             down_blocks=config.down_blocks,
             residual_blocks=config.residual_blocks,
             shortcut=config.geometry,
+            even=config.even,
+        )
+        side = config.texture_size
+        self.prior = (
+            nn.Parameter(torch.zeros(1, COLOUR_CHANNELS, side, side))
+            if config.prior and config.has_feature_net
+            else None
         )
         layout = load_uv_layout()
         tables = {"charts": layout.charts.clone()}
@@ -161,6 +168,9 @@ class NeuralReRenderer(nn.Module):
             known.append(shown)
         if self.config.geometry:
             known.append(self._places_like(texture))
+        if self.prior is not None:
+            prior = F.adaptive_avg_pool2d(self.prior, texture.shape[2:])
+            known.append(prior.to(texture.dtype).expand_as(texture))
         return [texture, *known]
 
     def _mirror_and_fill(

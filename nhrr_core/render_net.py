@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
@@ -29,14 +30,56 @@ class ResidualBlock(nn.Module):
         return x + self.body(x)
 
 
+class UpConvolution(nn.ConvTranspose2d):
+    """A 3x3 transposed convolution of stride 2, as four convolutions, one for each output parity.
+
+    A pixel of an even row and column sees the kernel's centre alone, others see two or four taps.
+    Where those four sets of taps have different sums, it draws a checkerboard over whatever is
+    flat. `even` takes that freedom away: the kernel is replaced by the nearest one with equal
+    sums, which leaves flat what is flat, and costs nothing once the weights are fixed. Bilinear
+    and nearest up-sampling are among what is left.
+
+    Source of the condition: Sugawara, Shiota and Kiya, "Checkerboard-artifacts-free CNNs" (2019).
+    """
+
+    def __init__(self, inputs: int, outputs: int, *, even: bool) -> None:
+        super().__init__(inputs, outputs, 3, stride=2, padding=1, output_padding=1)
+        self.even = even
+
+    @property
+    def kernel(self) -> Float[Tensor, "I O 3 3"]:
+        """The weights that are convolved with."""
+        return even_kernel(self.weight) if self.even else self.weight
+
+    def forward(self, x: Float[Tensor, "B I H W"]) -> Float[Tensor, "B O 2*H 2*W"]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Convolve to twice the height and width."""
+        return F.conv_transpose2d(x, self.kernel, self.bias, 2, 1, 1)
+
+
+def even_kernel(weight: Float[Tensor, "I O 3 3"]) -> Float[Tensor, "I O 3 3"]:
+    """Project kernels onto those whose taps have the same sum at each of the four output parities.
+
+    The orthogonal projection: with S_p the sum of the n_p taps of parity p, each of these changes
+    by (m - S_p) / n_p, where m is the mean of all S_p weighted by 1 / n_p.
+    """
+    rows = torch.stack([weight[..., 1], weight[..., 0] + weight[..., 2]], -1)
+    sums = torch.stack([rows[..., 1, :], rows[..., 0, :] + rows[..., 2, :]], -2)
+    share = weight.new_tensor([[1.0, 0.5], [0.5, 0.25]])  # 1 / n_p
+    mean = (sums * share).sum((-2, -1), keepdim=True) / share.sum()
+    change = (mean - sums) * share
+    # tap k of a row or column belongs to parity 1, 0, 1
+    return weight + change[..., [1, 0, 1], :][..., [1, 0, 1]]
+
+
 class RenderNet(nn.Module):
     """Pix2PixHD's global generator: 7x7, down blocks, residual blocks, up blocks, 7x7, tanh.
 
     Args:
         width: Channels of the first convolution; they double at each down block.
         shortcut: Whether the last convolution reads the network's input, too.
+        even: Whether the up blocks can draw no checkerboard, see `UpConvolution`.
     Source: the paper, Sec. 3.4, Eq. 3; layer shapes from Pix2PixHD (Wang et al., CVPR 2018).
-        Departs from it: `shortcut`, off by default.
+        Departs from it: `shortcut` and `even`, off by default.
     """
 
     def __init__(
@@ -48,6 +91,7 @@ class RenderNet(nn.Module):
         down_blocks: int,
         residual_blocks: int,
         shortcut: bool = False,
+        even: bool = False,
     ) -> None:
         super().__init__()
         self.shortcut = shortcut
@@ -60,9 +104,7 @@ class RenderNet(nn.Module):
         layers += [ResidualBlock(width * 2**down_blocks) for _ in range(residual_blocks)]
         for i in reversed(range(down_blocks)):
             narrow = width * 2**i
-            layers += [
-                nn.ConvTranspose2d(narrow * 2, narrow, 3, stride=2, padding=1, output_padding=1)
-            ]
+            layers += [UpConvolution(narrow * 2, narrow, even=even)]
             layers += [nn.InstanceNorm2d(narrow), nn.ReLU(inplace=True)]
         read = width + inputs if shortcut else width
         layers += [nn.ReflectionPad2d(3), nn.Conv2d(read, outputs, 7), nn.Tanh()]

@@ -34,13 +34,14 @@ Precision = Literal["auto", "fp32", "bf16"]
 
 LOSSES = "Losses (the paper's; one without its network is an error)"
 DEFAULT_PRESET = "lite"
-FREE_TO_CHANGE = ("colour_margin", "clearance", "geometry")
+FREE_TO_CHANGE = ("colour_margin", "clearance", "geometry", "prior", "even")
 """Settings of the model that a run may turn on, whatever it starts from."""
 
 PEOPLE = "people"
 PEOPLE_RECIPE: dict[str, Any] = {
     "model.alpha": True,
     "losses.identity": "none",
+    "losses.head_weight": 3.0,
     "losses.adversarial_from": 0.85,
     "optimiser.half_size": 0.7,
 }
@@ -154,7 +155,7 @@ class LossSettings:
         perceptual, identity: `none` leaves the loss out.
         vgg19_file: Empty: where torchvision keeps it.
         adversarial_from: The share of the steps after which the discriminator joins.
-        *_weight: The lambdas. Source: the paper, Sec. 3.5; alpha's is this project's.
+        *_weight: The lambdas. Source: the paper, Sec. 3.5; alpha's and head's are this project's.
     """
 
     perceptual: Perceptual = option(
@@ -180,6 +181,7 @@ class LossSettings:
     identity_weight: Factor = 5.0
     texture_weight: Factor = 1.0
     alpha_weight: Factor = 10.0
+    head_weight: Factor = 0.0
 
     @property
     def weights(self) -> LossWeights:

@@ -86,6 +86,12 @@ HEAD_PARTS = (23, 24)
 MIN_FACE_PIXELS = 64
 """Fewer pixels of a face, about 8 x 8, have no identity."""
 
+MIN_HEAD_PIXELS = 120
+"""Fewer pixels of a head, about 11 x 11, show no features."""
+
+HEAD_MARGIN = 0.175
+"""Of the head's longer side, left around it on each side."""
+
 # Places on the head in metres, as in UVLayout.position: y up, z forward. From the layout itself:
 # nose tip at y = 0.395, eyes at 0.425; the mouth, at 0.355, follows from the distance to the eyes.
 FACE_BOTTOM, FACE_TOP = 0.33, 0.45  # chin to eyebrows, which no hair covers
@@ -139,6 +145,26 @@ def find_faces(
     centre = torch.stack([(left + right) / 2, (top + bottom) / 2 - rise], 1)
     boxes = torch.cat([centre - half, centre + half], 1)
     seen = face.sum((1, 2)) >= MIN_FACE_PIXELS
+    whole = boxes.new_tensor([0, 0, width, height])
+    return torch.where(seen[:, None], boxes, whole), seen
+
+
+def find_heads(
+    iuv: UInt8[Tensor, "B 3 H W"],
+) -> tuple[Float[Tensor, "B 4"], Bool[Tensor, " B"]]:
+    """Find the square around each head, hair included as far as HEAD_MARGIN reaches.
+
+    Returns: Boxes, and whether at least MIN_HEAD_PIXELS of the head are seen; where they are not,
+        the box is the whole image.
+    """
+    head = (iuv[:, 0] >= HEAD_PARTS[0]) & (iuv[:, 0] <= HEAD_PARTS[1])
+    height, width = head.shape[1:]
+    left, right = _extent(head.any(1))
+    top, bottom = _extent(head.any(2))
+    half = torch.maximum(right - left, bottom - top) * (0.5 + HEAD_MARGIN)
+    middle = torch.stack([left + right, top + bottom], 1) / 2
+    boxes = torch.cat([middle - half[:, None], middle + half[:, None]], 1)
+    seen = head.sum((1, 2)) >= MIN_HEAD_PIXELS
     whole = boxes.new_tensor([0, 0, width, height])
     return torch.where(seen[:, None], boxes, whole), seen
 

@@ -340,7 +340,9 @@ def _widen(init: NeuralReRenderer, model: NeuralReRenderer) -> dict[str, Tensor]
     """The weights to start from; inputs that only the new networks read begin without effect."""
     weights = init.state_dict()
     for name, own in model.state_dict().items():
-        if own.ndim == 4:
+        if name not in weights:  # a prior that was not there
+            weights[name] = own
+        elif own.ndim == 4:
             # new inputs are the last ones of their convolutions
             missing = own.shape[1] - weights[name].shape[1]
             weights[name] = F.pad(weights[name], (0, 0, 0, 0, 0, missing))

@@ -28,6 +28,8 @@ def test_defaults_are_the_papers() -> None:
         "clearance": False,
         "geometry": False,
         "colour_margin": False,
+        "prior": False,
+        "even": False,
     }
 
 
@@ -42,6 +44,8 @@ def test_presets() -> None:
         colour_margin=True,
         clearance=True,
         geometry=True,
+        prior=True,
+        even=True,
     )
 
 

@@ -8,7 +8,7 @@ from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
 from nhrr_core import ModelConfig, RenderNet
-from nhrr_core.render_net import ResidualBlock
+from nhrr_core.render_net import ResidualBlock, UpConvolution, even_kernel
 
 
 def small(**changes: Any) -> RenderNet:
@@ -80,8 +80,8 @@ def test_layers_are_the_global_generator_s() -> None:
         ("Conv2d", 8, 16, 3, 2),
         ("Conv2d", 16, 16, 3, 1),
         ("Conv2d", 16, 16, 3, 1),
-        ("ConvTranspose2d", 16, 8, 3, 2),
-        ("ConvTranspose2d", 8, 4, 3, 2),
+        ("UpConvolution", 16, 8, 3, 2),
+        ("UpConvolution", 8, 4, 3, 2),
         ("Conv2d", 4, 3, 7, 1),
     ]
 
@@ -146,3 +146,38 @@ def test_gradient_reaches_every_weight_and_the_features() -> None:
         assert parameter.grad is not None and parameter.grad.isfinite().all(), name
         if name.endswith("weight"):
             assert parameter.grad.abs().sum() > 0, name
+
+
+def test_up_convolution_is_the_papers_transposed_one() -> None:
+    up = UpConvolution(4, 3, even=False)
+    plain = nn.ConvTranspose2d(4, 3, 3, stride=2, padding=1, output_padding=1)
+    plain.load_state_dict(up.state_dict())
+    x = torch.rand(2, 4, 5, 6)
+    assert torch.equal(up(x), plain(x))
+
+
+def inner(image: torch.Tensor) -> torch.Tensor:
+    """Without the border, where the kernel reaches outside."""
+    return image[..., 2:-2, 2:-2]
+
+
+def test_even_up_convolution_leaves_flat_what_is_flat() -> None:
+    torch.manual_seed(3)
+    flat = torch.rand(1, 4, 1, 1).expand(1, 4, 8, 8)
+    with torch.no_grad():
+        even, free = (inner(UpConvolution(4, 3, even=each)(flat)) for each in (True, False))
+    assert (even - even.mean((2, 3), keepdim=True)).abs().max() < 1e-6
+    assert (free - free.mean((2, 3), keepdim=True)).abs().max() > 0.01
+
+
+def test_even_kernel_is_the_nearest_and_keeps_bilinear_up_sampling() -> None:
+    torch.manual_seed(3)
+    line = torch.tensor([0.5, 1, 0.5])
+    bilinear = torch.outer(line, line).expand(2, 3, 3, 3)
+    assert torch.allclose(even_kernel(bilinear), bilinear, atol=1e-6)
+    weight = torch.randn(2, 3, 3, 3)
+    even = even_kernel(weight)
+    assert torch.allclose(even_kernel(even), even, atol=1e-6)
+    # an orthogonal projection: what it takes away has no part within what is allowed
+    other = even_kernel(torch.randn(2, 3, 3, 3))
+    assert ((weight - even) * other).sum().abs() < 1e-4
