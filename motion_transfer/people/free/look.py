@@ -18,6 +18,7 @@ from motion_transfer.people.clothes.outfits import sample_outfit
 from motion_transfer.people.clothes.wardrobe import Outfit
 from motion_transfer.people.figure.body import Shape
 from motion_transfer.people.free.assets import Assets, Colour, Item
+from motion_transfer.people.free.binding import load_parts
 from motion_transfer.people.head.faces import Face, greyed, sample_face
 from motion_transfer.people.head.hair import Hair, sample_hair
 
@@ -30,7 +31,7 @@ HELD_OUT_SHARE = 0.5
 DOLLS = ("creamy_female", "light_skin_female_bronze")
 """Skins as even as a doll's."""
 
-OVER_EYES = ("short03", "short04")
+OVER_EYES = ("bob01", "short03", "short04")
 """Hair that covers an eye."""
 
 UNDER_HATS = ("short04",)
@@ -38,6 +39,9 @@ UNDER_HATS = ("short04",)
 
 UNISEX = ("male_casualsuit02", "male_casualsuit03", "male_casualsuit04")
 """Suits that women wear as well."""
+
+SKIRTED = ("female_elegantsuit01",)
+"""Suits whose lower part is a skirt."""
 
 UNDYED = ("male_elegantsuit01",)
 """Suits whose pieces have colours that belong together."""
@@ -55,7 +59,8 @@ LIGHT: tuple[Colour, ...] = (
 LIGHT_SHARE = 0.2
 OUTFIT_SHARE = 0.4  # the project's own garments: twelve suits are few cuts
 GROWN_SHARE = 0.3  # its own hair, of which there are more styles than of photographed
-SKIRT_SHARE = 0.2  # of women in photographed clothes
+SKIRT_SHARE, TOP_SHARE = 0.2, 0.3  # of women in photographed clothes; of those in tops
+MIXED_SHARE = 0.3  # of those wear the shirt of one suit and the trousers of another
 HAT_SHARE, BALD_SHARE = 0.06, 0.06
 AFRO_SHARE = 0.5  # of people of african types
 YOUNG, MIDDLE_AGED = 0.72, 0.82  # the ages below which a skin of that age is worn
@@ -70,6 +75,19 @@ class Dye:
 
 
 @dataclass(frozen=True)
+class Worn:
+    """An item of clothing, or a part of it; see `load_parts`.
+
+    Attributes:
+        dye: None: its own colours.
+    """
+
+    item: str
+    part: str = "whole"
+    dye: Dye | None = None
+
+
+@dataclass(frozen=True)
 class Look:
     """Everything of one free person but the build; JSON-able through `dataclasses.asdict`.
 
@@ -79,8 +97,7 @@ class Look:
         tone: Multiplies the skin's colours.
         hair_colour: sRGB; brows have it, too.
         hat_picture: A role of the hat's pictures.
-        clothes: Names of items.
-        upper, lower: What shirts and trousers are dyed; None: as they are.
+        clothes: Shirt, trousers, shoes and the like.
         face: Whose beard and glasses are worn; its colours are not seen.
         outfit: The project's own garments, in place of clothes.
         grown: The project's own hair, in place of an item's.
@@ -95,9 +112,7 @@ class Look:
     hair: str | None
     hat: str | None
     hat_picture: str
-    clothes: tuple[str, ...]
-    upper: Dye | None
-    lower: Dye | None
+    clothes: tuple[Worn, ...]
     face: Face
     outfit: Outfit | None
     grown: Hair | None
@@ -121,6 +136,10 @@ class _Closet:
         often = self._rng.random() < HELD_OUT_SHARE
         chosen = (apart if often and apart else items) if self._held_out else kept or items
         return chosen[int(self._rng.integers(len(chosen)))] if chosen else None
+
+    def parts(self, item: Item | None) -> tuple[str, ...]:
+        """Tell what of an item can be worn apart."""
+        return tuple(load_parts(item, self._assets)) if item else ()
 
     def of(self, kind: str, sex: str | None = None) -> list[Item]:
         items = self._assets.of(kind)
@@ -150,7 +169,6 @@ def sample_look(rng: Generator, shape: Shape, assets: Assets, *, held_out: bool)
     clothes, outfit = _clothes(rng, closet, sex), None
     if not clothes or rng.random() < OUTFIT_SHARE:
         clothes, outfit = (), sample_outfit(rng, replace(shape, gender=float(sex == "female")))
-    upper, lower = _dyes(rng, clothes)
     hats = [role for role in (hat.pictures if hat else ()) if role.startswith("diffuse")]
     return Look(
         skin=skin.name,
@@ -163,8 +181,6 @@ def sample_look(rng: Generator, shape: Shape, assets: Assets, *, held_out: bool)
         hat=_name(hat),
         hat_picture=hats[int(rng.integers(len(hats)))] if hats else "diffuse",
         clothes=clothes,
-        upper=upper,
-        lower=lower,
         face=face,
         outfit=outfit,
         grown=grown,
@@ -233,29 +249,38 @@ def _hair(
     return hair, None
 
 
-def _clothes(rng: Generator, closet: _Closet, sex: str) -> tuple[str, ...]:
-    """Choose a suit, or a top and a skirt, and shoes: whatever it is, no part of a body is nude."""
-    shoes = closet.draw(closet.of("shoes", sex))
+def _clothes(rng: Generator, closet: _Closet, sex: str) -> tuple[Worn, ...]:
+    """Choose something for trunk, legs and feet, or nothing where the folder lacks one of them."""
     suits = [item for item in closet.of("suit") if item.sex in (sex, "any")]
     if sex == "female":
         suits += [item for item in closet.of("suit") if item.name in UNISEX]
+    suit, other = closet.draw(suits), closet.draw(suits)
     top, skirt = closet.draw(closet.of("top", sex)), closet.draw(closet.of("skirt", sex))
-    worn: list[Item | None] = [closet.draw(suits)]
-    if top and skirt and (worn[0] is None or rng.random() < SKIRT_SHARE):
-        worn = [top, skirt]
-    if None in worn or shoes is None:
+    shoes = closet.draw(closet.of("shoes", sex))
+    upper, lower = _dyes(rng)
+    kind = rng.random()
+    parts = closet.parts(suit)
+    shirt = suit.name if suit and "upper" in parts else None
+    if skirt and (shirt or top) and (suit is None or kind < SKIRT_SHARE):
+        plain = shirt is None or (top and kind < SKIRT_SHARE * TOP_SHARE)
+        above = Worn(top.name, dye=upper) if top and plain else Worn(str(shirt), "upper", upper)
+        worn = [above, Worn(skirt.name, dye=lower)]
+    elif shirt and other and kind > 1 - MIXED_SHARE and "lower" in closet.parts(other):
+        worn = [Worn(shirt, "upper", upper), Worn(other.name, "lower", lower)]
+    elif suit:
+        dyes = {} if suit.name in UNDYED else {"upper": upper, "lower": lower, "whole": upper}
+        worn = [Worn(suit.name, part, dyes.get(part)) for part in parts]
+    else:
         return ()
-    return tuple(item.name for item in [*worn, shoes] if item)
+    return (*worn, Worn(shoes.name)) if shoes else ()
 
 
-def _dyes(rng: Generator, clothes: Sequence[str]) -> tuple[Dye | None, Dye | None]:
-    """Choose colours for shirt and trousers, apart; now and then plain light cloth all over."""
+def _dyes(rng: Generator) -> tuple[Dye | None, Dye | None]:
+    """Choose colours above and below the waist; now and then plain light cloth all over."""
     light = rng.random() < LIGHT_SHARE
     shades = [LIGHT[int(rng.integers(len(LIGHT)))] for _ in range(2)]
     palette = sample_palette(rng, 2)
     dyed = rng.random(2) < (0.8, 0.6)
-    if not clothes or clothes[0] in UNDYED:
-        return None, None
     if light:
         shades[1] = shades[0] if rng.random() < 0.5 else shades[1]
         return Dye(shades[0], 0.97), Dye(shades[1], 0.97)

@@ -14,9 +14,10 @@ from motion_transfer.people.figure.body import Body, BodyModel, Points, Shape
 from motion_transfer.people.figure.mesh import Material, Piece
 from motion_transfer.people.figure.picture import Overlay
 from motion_transfer.people.free.assets import BODY_POINTS, Assets, Colour, Item, load_mesh
-from motion_transfer.people.free.binding import Garment, load_garment, load_helpers
-from motion_transfer.people.free.look import Dye, Look, sample_look
+from motion_transfer.people.free.binding import Garment, load_helpers, load_parts
+from motion_transfer.people.free.look import SKIRTED, Dye, Look, Worn, sample_look
 from motion_transfer.people.free.pictures import brightness, load_normals, load_picture
+from motion_transfer.people.free.settling import hang_hair, hang_skirt
 from motion_transfer.people.head.face_wear import wear_pieces
 from motion_transfer.people.head.hair import hair_pieces
 from motion_transfer.people.head.head_map import rigid
@@ -75,7 +76,7 @@ class _Dressing:
 
     def pieces(self) -> Iterator[Piece]:
         look = self.look
-        worn = [piece for name in look.clothes for piece in self.garment(name)]
+        worn = [self.garment(each) for each in look.clothes]
         skin = self.skin()
         if look.outfit:
             dressed = DressedBody(look.outfit, self.body, body_surface(self.model))
@@ -112,45 +113,39 @@ class _Dressing:
             keep=np.ones(len(self.body.points), np.float32),
         )
 
-    def garment(self, name: str) -> Iterator[Piece]:
-        """Make an item of clothing: one piece, or of a suit one above and one below the waist."""
-        item = self.assets.items[name]
-        garment = load_garment(item, self.assets)
+    def garment(self, worn: Worn) -> Piece:
+        item = self.assets.items[worn.item]
+        garment = load_parts(item, self.assets)[worn.part]
         self.hidden |= garment.hidden
-        points = garment.fit(self.rest)
-        for lower, dye in ((False, self.look.upper), (True, self.look.lower)):
-            if item.kind == "skirt":
-                dye = self.look.lower
-            chosen = garment.lower == lower
-            if chosen.any():
-                region = lower if item.kind == "suit" else None
-                dye = None if item.kind == "shoes" else dye
-                overlay = self.overlay(item, "diffuse", dye, region)
-                yield self.piece(item, garment, points, overlay, chosen)
+        piece = self.piece(item, self.overlay(item, "diffuse", worn.dye, worn.part), garment)
+        if item.kind == "skirt" or (item.name in SKIRTED and worn.part == "lower"):
+            hung = hang_skirt(piece.points, self.body, body_surface(self.model))
+            piece = replace(piece, weights=hung.weights, settle=hung.settle)
+        return piece
 
     def eyes(self) -> Piece:
-        item = self.assets.of("eyes")[0]
-        garment = load_garment(item, self.assets)
         picture = load_picture(self.assets.items[self.look.eyes], "diffuse", self.assets)
-        return self.piece(item, garment, garment.fit(self.rest), Overlay(picture))
+        return self.piece(self.assets.of("eyes")[0], Overlay(picture))
 
     def on_head(self, name: str, role: str = "diffuse") -> Piece:
         """Make hair, a hat, brows or lashes."""
         item = self.assets.items[name]
-        garment = load_garment(item, self.assets)
-        points = garment.fit(self.rest)
         dyed = item.kind in ("hair", "eyebrows")
         dye = Dye(self.look.hair_colour, HAIR_SHARE) if dyed else None
-        piece = self.piece(item, garment, points, self.overlay(item, role, dye, None))
-        if item.kind in ("hair", "hat"):  # bones of the face and the neck would stretch it
-            piece = replace(piece, weights=rigid(self.model, len(points)))
-        return piece
+        piece = self.piece(item, self.overlay(item, role, dye))
+        if item.kind not in ("hair", "hat"):
+            return piece
+        settle = None
+        if item.kind == "hair":
+            settle = hang_hair(piece.points, piece.faces, self.body, self.model)
+        # bones of the face and the neck would stretch it
+        return replace(piece, weights=rigid(self.model, len(piece.points)), settle=settle)
 
-    def overlay(self, item: Item, role: str, dye: Dye | None, lower: bool | None) -> Overlay:
+    def overlay(self, item: Item, role: str, dye: Dye | None, part: str = "whole") -> Overlay:
         picture, normals = load_picture(item, role, self.assets), load_normals(item)
         if dye is None:
             return Overlay(picture, normals, cut_out=item.alpha)
-        mean = brightness(item, lower, self.assets)
+        mean = brightness(item, part, self.assets)
         return Overlay(
             picture,
             normals,
@@ -161,20 +156,15 @@ class _Dressing:
             cut_out=item.alpha,
         )
 
-    def piece(
-        self,
-        item: Item,
-        garment: Garment,
-        points: Points,
-        overlay: Overlay,
-        chosen: np.ndarray | slice = slice(None),
-    ) -> Piece:
+    def piece(self, item: Item, overlay: Overlay, garment: Garment | None = None) -> Piece:
+        garment = garment or load_parts(item, self.assets)["whole"]
+        points = garment.fit(self.rest)
         return Piece(
             name=item.name,
             points=points,
-            faces=np.ascontiguousarray(garment.faces[chosen]),
+            faces=garment.faces,
             weights=garment.weights,
-            corner_uv=np.ascontiguousarray(garment.corner_uv[chosen]),
+            corner_uv=garment.corner_uv,
             material=_overlaid(item.kind, overlay),
             keep=np.ones(len(points), np.float32),
             two_sided=item.kind != "eyes",

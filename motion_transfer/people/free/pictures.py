@@ -15,7 +15,7 @@ from jaxtyping import UInt8
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.people.figure.picture import Picture, mean_brightness
 from motion_transfer.people.free.assets import Assets, Item, load_mesh
-from motion_transfer.people.free.binding import load_garment
+from motion_transfer.people.free.binding import load_parts
 
 LARGEST = 1024  # px a side; a body's skin then has a texel for each 2 mm
 
@@ -88,11 +88,10 @@ def load_normals(item: Item) -> Picture | None:
 
 
 @lru_cache(maxsize=256)
-def brightness(item: Item, lower: bool | None, assets: Assets) -> float:
-    """Measure the mean brightness of an item; of a suit, of its trousers or of what is above."""
-    garment = load_garment(item, assets)
-    chosen = slice(None) if lower is None else garment.lower == lower
-    return mean_brightness(load_picture(item, "diffuse", assets), garment.corner_uv[chosen])
+def brightness(item: Item, part: str, assets: Assets) -> float:
+    """Measure the mean brightness of a part of an item."""
+    seen = load_parts(item, assets)[part].corner_uv
+    return mean_brightness(load_picture(item, "diffuse", assets), seen)
 
 
 def _read(item: Item, role: str) -> tuple[UInt8[np.ndarray, "H W 3"], UInt8[np.ndarray, "H W"]]:
