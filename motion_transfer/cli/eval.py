@@ -34,8 +34,9 @@ def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -
     """Score renderers, and other methods' pictures, on the same pairs.
 
     Every source is rendered in its target's pose and compared with the real target: SSIM, PSNR,
-    l1, a perceptual distance, each for the whole picture and for the person alone; LPIPS and FID
-    with weights that you give.
+    l1, a perceptual distance, each for the whole picture and for the person alone; the same
+    distance of what the source hides and of the enlarged head; lattices; faces; LPIPS and FID with
+    weights that you give. A number that not all pairs have says of how many it is.
 
     \b
     mt eval --pairs pairs.csv --renderer texture -o draft/

@@ -39,6 +39,7 @@ class PairPictures:
     """One pair as it is compared, everything at the framing's size; a result for each method."""
 
     source: Image
+    source_iuv: Image
     target: TargetFrame
     results: Sequence[Image]
 
@@ -80,6 +81,10 @@ class Framing:
         """Scale the whole picture to fit, and pad it."""
         return self._place(picture, self.padding, exact=False)
 
+    def fit_iuv(self, iuv: Image) -> Image:
+        """Do the same with IUV, whose values are not mixed."""
+        return self._place(iuv, (0, 0, 0), exact=True)
+
     def fit_target(self, target: PersonPicture) -> TargetFrame:
         """Lay a target over the background colour where its alpha is known, and fit it."""
         rgb = target.rgb
@@ -89,7 +94,7 @@ class Framing:
         mask = person_mask(target.iuv, target.alpha)
         return TargetFrame(
             rgb=self.fit(rgb),
-            iuv=self._place(target.iuv, (0, 0, 0), exact=True),
+            iuv=self.fit_iuv(target.iuv),
             mask=self._place(mask.astype(np.uint8), 0, exact=True) > 0,
         )
 

@@ -21,7 +21,9 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from motion_transfer.errors import InputError
+from motion_transfer.estimate.models import FACE_DETECTOR, FACE_NETWORK, ModelFile, is_there
 from motion_transfer.evaluation.framing import Image, PairPictures
+from motion_transfer.extras import missing_packages
 from motion_transfer.training.metrics import (
     FLICKER_TEXELS,
     average_ssim,
@@ -93,9 +95,14 @@ class SetMeasure(ABC):
 
 @dataclass(frozen=True)
 class Measures:
-    """The measures of one evaluation, in the table's order."""
+    """The measures of one evaluation, in the table's order.
+
+    Attributes:
+        packages: The distributions that take part in computing the numbers.
+    """
 
     chosen: tuple[Measure | SetMeasure, ...] = ()
+    packages: tuple[str, ...] = PACKAGES
 
     @property
     def pairs(self) -> tuple[Measure, ...]:
@@ -112,12 +119,6 @@ class Measures:
         """All numbers."""
         return tuple(column for each in self.chosen for column in each.columns)
 
-    @property
-    def packages(self) -> tuple[str, ...]:
-        """The distributions that take part in computing the numbers."""
-        rows = (MEASURES.get(column.name) for column in self.columns)
-        return (*PACKAGES, *(row.package for row in rows if row and row.package))
-
 
 @dataclass(frozen=True)
 class MeasureRow:
@@ -126,21 +127,42 @@ class MeasureRow:
     Attributes:
         opener: `module:maker`, imported when it is first used; a maker that needs weights is called
             with their file, or None.
-        needs: What has to be given; a measure whose need is met is taken unless others are named.
+        needs: What has to be given, or to be in the cache already; a measure whose need is met is
+            taken unless others are named.
         package: A distribution that takes part in computing it, besides `PACKAGES`.
+        model: The file in the cache; `extra`: what runs it.
     """
 
     opener: str
-    needs: Literal["nothing", "weights", "clips"] = "nothing"
+    needs: Literal["nothing", "weights", "clips", "model"] = "nothing"
     package: str | None = None
+    model: ModelFile | None = None
+    extra: str | None = None
+
+    def is_met(self, weights: Path | None, has_clips: bool) -> bool:
+        """Tell whether what it needs is there."""
+        if self.needs == "model":
+            assert self.model is not None
+            runs = self.extra is None or not missing_packages(self.extra)
+            return runs and is_there(self.model)
+        return {"nothing": True, "clips": has_clips, "weights": weights is not None}[self.needs]
 
 
+_REGIONS = "motion_transfer.evaluation.region_measures"
+_FACES = "motion_transfer.evaluation.face_measures"
 _OUTSIDE = "motion_transfer.evaluation.outside_measures"
 MEASURES = {
     "ssim": MeasureRow(f"{__name__}:SsimMeasure"),
     "psnr": MeasureRow(f"{__name__}:psnr_measure"),
     "l1": MeasureRow(f"{__name__}:l1_measure"),
     EFFICIENTNET: MeasureRow(f"{__name__}:load_efficientnet"),
+    "hidden": MeasureRow(f"{_REGIONS}:load_hidden"),
+    "head": MeasureRow(f"{_REGIONS}:load_head"),
+    "faces": MeasureRow(
+        f"{_FACES}:FacesMeasure", "model", "ai-edge-litert", FACE_DETECTOR, "estimate"
+    ),
+    "identity": MeasureRow(f"{_FACES}:load_identity", "model", model=FACE_NETWORK),
+    "checkerboard": MeasureRow(f"{_REGIONS}:CheckerboardMeasure"),
     "lpips": MeasureRow(f"{_OUTSIDE}:LpipsMeasure", "weights", "lpips"),
     "fid": MeasureRow(f"{_OUTSIDE}:FidMeasure", "weights", "clean-fid"),
     "flicker": MeasureRow(f"{__name__}:FlickerMeasure", "clips"),
@@ -167,16 +189,16 @@ def choose_measures(
     if unknown:
         raise InputError(f"unknown metric {unknown[0]!r}; supported are {', '.join(MEASURES)}")
     if not names:
-        met = {"nothing": True, "clips": has_clips}
-        names = [name for name, row in MEASURES.items() if met.get(row.needs, files.get(name))]
+        names = [name for name, row in MEASURES.items() if row.is_met(files.get(name), has_clips)]
     if "flicker" in names and not has_clips:
         raise InputError("flicker compares consecutive frames: give --clips, or leave it out")
-    chosen = []
+    chosen, packages = [], [*PACKAGES]
     for name, row in MEASURES.items():
         if name in names:
             given = [files.get(name)] if row.needs == "weights" else []
             chosen.append(resolve_name(row.opener)(*given))
-    return Measures(tuple(chosen))
+            packages += [row.package] if row.package else []
+    return Measures(tuple(chosen), tuple(packages))
 
 
 def with_masked(column: Column) -> tuple[Column, Column]:
@@ -235,6 +257,14 @@ def l1_measure() -> PixelMeasure:
     return PixelMeasure(Column("l1", "lower", 2, definition), l1)
 
 
+def define_features(name: str, network: torch.nn.Module) -> str:
+    """Define the distance of features that `feature_distance` measures."""
+    return (
+        f"features of {name}: l2 of the difference of features of unit length, mean over"
+        f" positions, then layers; weights sha256 {hash_weights(network)}"
+    )
+
+
 class FeatureMeasure:
     """Perceptual distance of a frozen classifier's features.
 
@@ -249,11 +279,7 @@ class FeatureMeasure:
     takes_turns = True
 
     def __init__(self, name: str, network: torch.nn.Module) -> None:
-        definition = (
-            f"features of {name}: l2 of the difference of features of unit length, mean over"
-            f" positions, then layers; weights sha256 {hash_weights(network)}"
-        )
-        self.columns = with_masked(Column(name, "lower", 4, definition))
+        self.columns = with_masked(Column(name, "lower", 4, define_features(name, network)))
         self._network = network
 
     def measure(self, shown: PairPictures, _before: PairPictures | None = None) -> list[Numbers]:
@@ -271,10 +297,18 @@ def load_efficientnet() -> FeatureMeasure:
 
     Raises: InputError without the package of its weights.
     """
+    return FeatureMeasure(EFFICIENTNET, open_efficientnet())
+
+
+def open_efficientnet() -> torch.nn.Module:
+    """Open the frozen network whose features are compared.
+
+    Raises: InputError without the package of its weights.
+    """
     from motion_transfer.training.feature_networks import load_efficientnet_lite0
 
     try:
-        return FeatureMeasure(EFFICIENTNET, load_efficientnet_lite0())
+        return load_efficientnet_lite0()
     except InputError as error:
         # the network's own message names options of training, which evaluation does not have
         raise InputError(

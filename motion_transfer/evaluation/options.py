@@ -120,7 +120,8 @@ class EvaluationOptions:
     metrics: tuple[str, ...] = option(
         "--metrics",
         PROTOCOL,
-        "ssim psnr l1 efficientnet-lite0 (these by default), lpips, fid, flicker (with --clips).",
+        "ssim psnr l1 efficientnet-lite0 hidden head checkerboard (these by default), faces and"
+        " identity (after `mt models fetch --faces`), lpips, fid, flicker (with --clips).",
         kind="words",
         default=(),
         metavar="NAME...",

@@ -263,11 +263,17 @@ def compare(paths: Sequence[Path]) -> str:
 
 
 def table(columns: Sequence[Column], methods: Sequence[Method]) -> str:
-    """Draw numbers as rows, methods as columns: mean ± standard error, the best of a row marked."""
+    """Draw numbers as rows, methods as columns: mean ± standard error, the best of a row marked.
+
+    A number that not all pairs have says of how many it is the mean.
+    """
+    most = max((s.count for method in methods for s in method.scores.values()), default=0)
     rows = [["", *(method.label for method in methods)]]
-    rows += [
-        [f"{column.name} {ARROWS[column.better]}", *_cells(column, methods)] for column in columns
-    ]
+    for column in columns:
+        counts = {m.scores[column.name].count for m in methods if column.name in m.scores}
+        few = "-".join(map(str, sorted(counts)[:: max(1, len(counts) - 1)]))
+        name = f"{column.name} {ARROWS[column.better]}" + f" of {few}" * (counts != {most})
+        rows.append([name, *_cells(column, methods)])
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(

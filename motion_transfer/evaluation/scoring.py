@@ -135,7 +135,8 @@ class Scorer:
             self._attempt(candidate, run[0], partial(candidate.open_source, source))
             for candidate in self._candidates
         ]
-        shown = self._framing.fit(source.picture.rgb)
+        photo, iuv = source.picture.rgb, source.picture.iuv
+        shown = self._framing.fit(photo), self._framing.fit_iuv(iuv)
         for pair in run:
             if self._stop.is_set():
                 raise StoppedError
@@ -144,7 +145,7 @@ class Scorer:
                 self._framing.fit(self._attempt(candidate, pair, partial(draw, pair, target)))
                 for candidate, draw in zip(self._candidates, artists, strict=True)
             ]
-            yield PairPictures(shown, self._framing.fit_target(target), results)
+            yield PairPictures(*shown, self._framing.fit_target(target), results)
 
     def _attempt(self, candidate: Candidate, pair: Pair, call: Callable[[], T]) -> T:
         try:

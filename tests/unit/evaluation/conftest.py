@@ -15,4 +15,4 @@ def shown(studio) -> PairPictures:
     rgb = studio.dress(iuv)
     noisy = rgb + np.random.default_rng(0).normal(0, 20, rgb.shape)
     results = [rgb, np.clip(noisy, 0, 255).astype(np.uint8), rgb // 2]
-    return PairPictures(rgb, TargetFrame(rgb, iuv, iuv[..., 0] > 0), results)
+    return PairPictures(rgb, iuv, TargetFrame(rgb, iuv, iuv[..., 0] > 0), results)

@@ -50,7 +50,8 @@ def test_pictures_stand_in_their_columns(tmp_path) -> None:
         return np.full((128, 64, 3), level, np.uint8)
 
     mask = np.ones((128, 64), bool)
-    pictures = PairPictures(flat(10), TargetFrame(flat(20), flat(0), mask), [flat(30), flat(40)])
+    target = TargetFrame(flat(20), flat(0), mask)
+    pictures = PairPictures(flat(10), flat(0), target, [flat(30), flat(40)])
     pair = Pair(PhotoFile("a.png", tmp_path), PhotoFile("b" * 80 + ".png", tmp_path), group="a")
     labels = ["first", "a label that is much too long for its column" * 3]
     entry = PairScores(pair, [{"ssim": 0.1}, {"ssim": 0.2}], [])

@@ -89,13 +89,20 @@ def test_the_flicker_measure(shown: PairPictures) -> None:
         assert math.isnan(number)
 
 
-def test_the_default_choice() -> None:
+def test_the_default_choice(monkeypatch, tmp_path: Path) -> None:
     pytest.importorskip(PACKAGE)
+    monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path))  # no models of faces there
     chosen = choose_measures()
     names = [column.name for column in chosen.columns]
     always = [name for name, row in MEASURES.items() if row.needs == "nothing"]
-    assert always == ["ssim", "psnr", "l1", "efficientnet-lite0"]
-    assert names == [part for name in always for part in (name, f"{name}-masked")]
+    assert always == [
+        "ssim", "psnr", "l1", "efficientnet-lite0", "hidden", "head", "checkerboard"
+    ]  # fmt: skip
+    assert names == [
+        *(part for name in always[:4] for part in (name, f"{name}-masked")),
+        *("visible", "hidden", "head", "head-hidden"),
+        *("checkerboard-2", "checkerboard-4", "checkerboard-8"),
+    ]
     assert chosen.sets == ()
     assert chosen.packages == ("torch", "numpy", "opencv-contrib-python-headless")
     assert choose_measures(has_clips=True).columns[-1].name == "flicker"

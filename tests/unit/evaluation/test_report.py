@@ -208,6 +208,18 @@ def test_the_target_does_not_compete_and_gaps_are_dashes() -> None:
     assert lines[2].split() == ["l1", "↓", "25.00", "20.00*", "0.00"]
 
 
+def test_the_table_says_of_how_many_pairs_a_number_is(tmp_path: Path) -> None:
+    few = Summary(0.5, 0.5, None, 3)
+    methods = [method("a", 0.7, 2.0), method("b", 0.8, 1.0)]
+    name = COLUMNS[1].name
+    some = [replace(each, scores={**each.scores, name: few}) for each in methods]
+    lines = table(COLUMNS, some).splitlines()
+    assert f"{name} ↓ of 3 " in lines[2]
+    assert " of " not in lines[1]
+    one = [some[0], methods[1]]
+    assert " of 3-" in table(COLUMNS, one)
+
+
 def test_comparable_results_share_a_table(tmp_path: Path) -> None:
     more = Column("fid", "lower", 1, "FID")
     fid = Method("c", {}, {"fid": Summary(12.34, None, None, 9)})
