@@ -3,7 +3,7 @@
     MT_SAMPLES=DIR python benchmarks/quality.py photos  [--weights lite]
     MT_SAMPLES=DIR python benchmarks/quality.py flicker [--weights lite]
     MT_SAMPLES=DIR python benchmarks/quality.py checkerboard [--weights lite]
-    python benchmarks/quality.py behind [--weights lite] [--assets DIR] [--count 100]
+    python benchmarks/quality.py behind [--weights lite ...] [--assets DIR] [--count 100]
 
 `photos`: fashion photos from themselves, network against draft (the photos cannot be shipped).
 `flicker`: change between consecutive frames that motion does not explain, over a walk of 90 frames.
@@ -20,6 +20,7 @@ import csv
 import math
 import os
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import mean
@@ -61,7 +62,7 @@ RENDERERS = ("nhrr", "texture")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("what", choices=("photos", "flicker", "checkerboard", "behind"))
-    parser.add_argument("--weights", type=Path, default=Path("lite"))
+    parser.add_argument("--weights", type=Path, nargs="+", default=[Path("lite")])
     parser.add_argument("--assets", type=Path, help="free people, in these assets, not painted")
     parser.add_argument("--count", type=int, default=100, help="people seen from behind")
     arguments = parser.parse_args()
@@ -69,13 +70,14 @@ def main() -> None:
         compare_behind(arguments.weights, arguments.assets, arguments.count)
         return
     samples = Path(os.environ["MT_SAMPLES"])
-    with tempfile.TemporaryDirectory() as folder:
-        if arguments.what == "photos":
-            compare_photos(samples / "deepfashion", arguments.weights, Path(folder))
-        elif arguments.what == "flicker":
-            compare_flicker(samples, arguments.weights, Path(folder))
-        else:
-            compare_lattices(samples, arguments.weights, Path(folder))
+    for weights in arguments.weights:
+        with tempfile.TemporaryDirectory() as folder:
+            if arguments.what == "photos":
+                compare_photos(samples / "deepfashion", weights, Path(folder))
+            elif arguments.what == "flicker":
+                compare_flicker(samples, weights, Path(folder))
+            else:
+                compare_lattices(samples, weights, Path(folder))
 
 
 def list_photos(folder: Path) -> list[Path]:
@@ -182,7 +184,7 @@ class Truth(TargetCandidate):
         return draw
 
 
-def compare_behind(weights: Path, assets: Path | None, count: int) -> None:
+def compare_behind(weights: Sequence[Path], assets: Path | None, count: int) -> None:
     share = 1.0 if assets else None
     people = PeopleStream(seed=HELD_OUT_SEED, split="held-out", assets=assets, free_share=share)
     pairs = [
@@ -192,7 +194,7 @@ def compare_behind(weights: Path, assets: Path | None, count: int) -> None:
         for number in range(count)
     ]
     candidates = [
-        RenderedCandidate("nhrr", find_weights(weights), "white"),
+        *(RenderedCandidate("nhrr", find_weights(each), "white") for each in weights),
         RenderedCandidate("texture", None, "white"),
         Truth(),
     ]
@@ -200,7 +202,7 @@ def compare_behind(weights: Path, assets: Path | None, count: int) -> None:
     framing = Framing()
     with Scorer(candidates, measures, framing, workers=2) as scorer:
         scored = scorer.score(PairList("behind", pairs, ""))
-    print(table(measures.columns, summarise_methods(candidates, measures, scored)))
+    print(table(measures.columns, summarise_methods(candidates, measures, scored), count))
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -
         click.echo((options.output / "results.json").read_text(), nl=False)
     elif not quiet:
         protocol = results.protocol
-        click.echo(table(results.columns, results.methods))
+        click.echo(table(results.columns, results.methods, protocol.pairs_count))
         click.echo(
             f"{protocol.pairs_count} pairs of {protocol.pairs_name} at {protocol.resolution};"
             " mean ± standard error, * best\n"

@@ -22,6 +22,8 @@ from motion_transfer.training.face_networks import (
 )
 from motion_transfer.training.faces import (
     HEAD_PARTS,
+    MIN_FACE_PIXELS,
+    MIN_HEAD_PIXELS,
     crop_boxes,
     face_table,
     find_faces,
@@ -50,7 +52,12 @@ def looks_at_camera(iuv: Image) -> bool:
     face = mark_face(iuv, FACE_TABLE)
     smaller, larger = sorted(np.count_nonzero(face & (iuv[..., 0] == part)) for part in HEAD_PARTS)
     rows = np.flatnonzero(face.any(1))
-    return bool(smaller > LEAST_EVEN * larger and np.ptp(rows) + 1 >= MIN_FACE_HEIGHT)
+    return bool(
+        smaller + larger >= MIN_FACE_PIXELS
+        and smaller > LEAST_EVEN * larger
+        and np.ptp(rows) + 1 >= MIN_FACE_HEIGHT
+        and np.isin(iuv[..., 0], HEAD_PARTS).sum() >= MIN_HEAD_PIXELS
+    )
 
 
 class FacesMeasure:

@@ -259,21 +259,16 @@ def compare(paths: Sequence[Path]) -> str:
         for path, results in zip(paths, read, strict=True)
         for method in results.methods
     ]
-    return table(tuple(columns.values()), methods)
+    return table(tuple(columns.values()), methods, read[0].protocol.pairs_count)
 
 
-def table(columns: Sequence[Column], methods: Sequence[Method]) -> str:
+def table(columns: Sequence[Column], methods: Sequence[Method], pairs_count: int) -> str:
     """Draw numbers as rows, methods as columns: mean ± standard error, the best of a row marked.
 
     A number that not all pairs have says of how many it is the mean.
     """
-    most = max((s.count for method in methods for s in method.scores.values()), default=0)
     rows = [["", *(method.label for method in methods)]]
-    for column in columns:
-        counts = {m.scores[column.name].count for m in methods if column.name in m.scores}
-        few = "-".join(map(str, sorted(counts)[:: max(1, len(counts) - 1)]))
-        name = f"{column.name} {ARROWS[column.better]}" + f" of {few}" * (counts != {most})
-        rows.append([name, *_cells(column, methods)])
+    rows += [[_head(column, methods, pairs_count), *_cells(column, methods)] for column in columns]
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(
@@ -298,6 +293,16 @@ def scores_csv(
             cells = ["" if math.isnan(value) else repr(value) for value in values]
             writer.writerow([entry.pair.source.name, entry.pair.target.name, method, *cells])
     return text.getvalue()
+
+
+def _head(column: Column, methods: Sequence[Method], pairs_count: int) -> str:
+    """What begins a row: its number, which end is good, and of how many pairs it is."""
+    name = f"{column.name} {ARROWS[column.better]}"
+    counts = {m.scores[column.name].count for m in methods if column.name in m.scores}
+    if counts <= {pairs_count}:
+        return name
+    low, high = min(counts), max(counts)
+    return f"{name} of {low}" if low == high else f"{name} of {low}-{high}"
 
 
 def _cells(column: Column, methods: Sequence[Method]) -> list[str]:

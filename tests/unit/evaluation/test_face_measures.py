@@ -43,6 +43,8 @@ def face_iuv(right: int = 12, left: int = 12, height: int = 14) -> np.ndarray:
         ({"height": 10}, True),
         ({"height": 9}, False),
         ({"right": 0, "left": 0}, False),
+        ({"right": 3, "left": 3, "height": 11}, True),
+        ({"right": 3, "left": 3, "height": 10}, False),  # 60 px
     ],
 )
 def test_who_looks_at_the_camera(face: dict[str, int], looks: bool) -> None:

@@ -182,7 +182,7 @@ def test_a_line_for_each_pair_and_method(tmp_path: Path) -> None:
 
 
 def test_the_table_marks_the_best_as_printed() -> None:
-    lines = table(COLUMNS, RESULTS.methods).splitlines()
+    lines = table(COLUMNS, RESULTS.methods, 9).splitlines()
     assert lines[0].split() == ["a", "b"]
     assert lines[1].split() == ["ssim", "↑", "0.700", "±0.010", "0.800", "±0.010*"]
     assert lines[2].split() == ["l1", "↓", "20.00*", "20.00*"]  # equal as printed
@@ -190,11 +190,11 @@ def test_the_table_marks_the_best_as_printed() -> None:
 
 def test_the_target_does_not_compete_and_gaps_are_dashes() -> None:
     real = method("real", 1.0, 0.0, kind="target")
-    lines = table(COLUMNS, [method("a", 0.7, math.nan), real]).splitlines()
+    lines = table(COLUMNS, [method("a", 0.7, math.nan), real], 9).splitlines()
     assert "*" not in "".join(lines)
     assert lines[2].split() == ["l1", "↓", "-", "0.00"]
     rivals = [method("a", 0.7, 25), method("b", 0.6, 20), real]
-    lines = table(COLUMNS, rivals).splitlines()
+    lines = table(COLUMNS, rivals, 9).splitlines()
     assert lines[1].split() == [
         "ssim",
         "↑",
@@ -213,11 +213,11 @@ def test_the_table_says_of_how_many_pairs_a_number_is(tmp_path: Path) -> None:
     methods = [method("a", 0.7, 2.0), method("b", 0.8, 1.0)]
     name = COLUMNS[1].name
     some = [replace(each, scores={**each.scores, name: few}) for each in methods]
-    lines = table(COLUMNS, some).splitlines()
+    lines = table(COLUMNS, some, 9).splitlines()
     assert f"{name} ↓ of 3 " in lines[2]
     assert " of " not in lines[1]
     one = [some[0], methods[1]]
-    assert " of 3-" in table(COLUMNS, one)
+    assert " of 3-9 " in table(COLUMNS, one, 9)
 
 
 def test_comparable_results_share_a_table(tmp_path: Path) -> None:
