@@ -16,6 +16,7 @@ def small_net(
     down_blocks: int = 3,
     residual_blocks: int = 2,
     shortcut: bool = False,
+    even: bool = False,
 ) -> RenderNet:
     torch.manual_seed(0)
     return RenderNet(
@@ -25,6 +26,7 @@ def small_net(
         down_blocks=down_blocks,
         residual_blocks=residual_blocks,
         shortcut=shortcut,
+        even=even,
     ).eval()
 
 
@@ -55,7 +57,8 @@ def test_winograd_convolution_equals_conv2d(height: int, width: int) -> None:
 def test_same_function_in_float32(
     winograd: bool, shortcut: bool, outputs: int, down_blocks: int
 ) -> None:
-    net = small_net(outputs=outputs, down_blocks=down_blocks, shortcut=shortcut)
+    # even where the shortcut is, as in `lite`
+    net = small_net(outputs=outputs, down_blocks=down_blocks, shortcut=shortcut, even=shortcut)
     fast = FastRenderNet(net, dtype=torch.float32, winograd=winograd, compiled=False)
     features = torch.randn(2, 5, 64, 96)
     with torch.inference_mode():

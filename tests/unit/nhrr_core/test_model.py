@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
 from nhrr_core import (
@@ -316,6 +317,26 @@ def test_geometry_tells_feature_net_where_texels_lie(photo: Tensor, iuv: Tensor)
     assert torch.allclose(read[0][0, -3:], position / largest)
     assert torch.equal(feature_map[:, -3:], read[0][:, -3:])
     assert read[0].shape[1] == model.config.feature_inputs == 8
+
+
+@pytest.mark.parametrize("side", [64, 32])
+def test_feature_net_reads_a_prior_that_learns(photo: Tensor, iuv: Tensor, side: int) -> None:
+    torch.manual_seed(0)
+    model = small(prior=True)
+    assert model.feature_net is not None and model.prior is not None
+    model.prior.data.uniform_(-1, 1)
+    read: list[Tensor] = []
+    model.feature_net.register_forward_pre_hook(lambda _, given: read.append(given[0]))
+    texture = torch.zeros(2, 3, side, side)
+    model.encode_texture(texture, texture[:, :1]).sum().backward()
+    assert read[0].shape[1] == model.config.feature_inputs == 7
+    factor = 64 // side
+    assert torch.allclose(read[0][:, -3:], F.avg_pool2d(model.prior, factor).expand(2, -1, -1, -1))
+    assert model.prior.grad is not None and model.prior.grad.any()
+
+
+def test_variants_without_a_feature_net_have_no_prior() -> None:
+    assert small(variant="warp", prior=True).prior is None
 
 
 def test_geometry_decides_what_the_margin_is_carried_from(targets: Tensor) -> None:
