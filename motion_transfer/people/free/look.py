@@ -22,8 +22,9 @@ from motion_transfer.people.free.binding import load_parts
 from motion_transfer.people.head.faces import Face, greyed, sample_face
 from motion_transfer.people.head.hair import Hair, sample_hair
 
-HELD_OUT_IN = 5
-"""One item in so many, by the checksum of its name, is never worn in training."""
+HELD_OUT_IN, HELD_OUT_BY = 5, "kept apart"
+"""One item in so many, by the checksum of these words and its name, is never worn in training. The
+words were chosen so that of MakeHuman's items some of each kind and sex are."""
 
 HELD_OUT_SHARE = 0.5
 """How often a held-out person's skin, clothes, hair or shoes are drawn among those items alone."""
@@ -56,7 +57,7 @@ LIGHT: tuple[Colour, ...] = (
 )
 """White, cream and pale cloth: large plain light clothes are the hardest to keep their shape."""
 
-LIGHT_SHARE = 0.2
+LIGHT_SHARE = 0.25
 OUTFIT_SHARE = 0.4  # the project's own garments: twelve suits are few cuts
 GROWN_SHARE = 0.3  # its own hair, of which there are more styles than of photographed
 SKIRT_SHARE, TOP_SHARE = 0.2, 0.3  # of women in photographed clothes; of those in tops
@@ -120,30 +121,32 @@ class Look:
 
 def is_held_out(name: str) -> bool:
     """Tell whether an item is kept from training, whatever the folder that holds it."""
-    return zlib.crc32(name.encode()) % HELD_OUT_IN == 0
+    return zlib.crc32(f"{HELD_OUT_BY}:{name}".encode()) % HELD_OUT_IN == 0
 
 
 class _Closet:
-    """Draws items: of training without the held-out ones, else often among those alone."""
+    """What somebody may wear: in training nothing that is held out, if anything else is left."""
 
     def __init__(self, rng: Generator, assets: Assets, held_out: bool) -> None:
         self._rng, self._assets, self._held_out = rng, assets, held_out
 
+    def of(self, kind: str, sex: str | None = None) -> list[Item]:
+        """List the items of a kind that a sex may wear; None: whoever wears them."""
+        items = [i for i in self._assets.of(kind) if sex is None or i.sex in (sex, "any")]
+        if self._held_out:
+            return items
+        return [item for item in items if not is_held_out(item.name)] or items
+
     def draw(self, items: Sequence[Item]) -> Item | None:
-        """Draw one; None where there is none. Where all are held out, training wears them."""
-        apart = [item for item in items if is_held_out(item.name)]
-        kept = [item for item in items if not is_held_out(item.name)]
+        """Draw one, of the held-out split often one of the held-out; None where there is none."""
         often = self._rng.random() < HELD_OUT_SHARE
-        chosen = (apart if often and apart else items) if self._held_out else kept or items
+        apart = [item for item in items if is_held_out(item.name)]
+        chosen = apart if self._held_out and often and apart else items
         return chosen[int(self._rng.integers(len(chosen)))] if chosen else None
 
     def parts(self, item: Item | None) -> tuple[str, ...]:
         """Tell what of an item can be worn apart."""
         return tuple(load_parts(item, self._assets)) if item else ()
-
-    def of(self, kind: str, sex: str | None = None) -> list[Item]:
-        items = self._assets.of(kind)
-        return [item for item in items if sex is None or item.sex in (sex, "any")]
 
 
 def sample_look(rng: Generator, shape: Shape, assets: Assets, *, held_out: bool) -> Look:
@@ -151,8 +154,9 @@ def sample_look(rng: Generator, shape: Shape, assets: Assets, *, held_out: bool)
 
     Args:
         held_out: Whether the person is one of the split that nothing is trained on. Nobody in
-            training wears what `is_held_out`; people of that split often do, and the others of
-            theirs are in combinations of their own.
+            training wears an item that `is_held_out`; of that split's people half of the skins,
+            of the suits, of the hair and of the shoes are such, wherever one fits, and all
+            combinations and colours are their own.
     """
     sex = "female" if shape.gender > 0.5 else "male"
     closet = _Closet(rng, assets, held_out)
@@ -251,7 +255,7 @@ def _hair(
 
 def _clothes(rng: Generator, closet: _Closet, sex: str) -> tuple[Worn, ...]:
     """Choose something for trunk, legs and feet, or nothing where the folder lacks one of them."""
-    suits = [item for item in closet.of("suit") if item.sex in (sex, "any")]
+    suits = closet.of("suit", sex)
     if sex == "female":
         suits += [item for item in closet.of("suit") if item.name in UNISEX]
     suit, other = closet.draw(suits), closet.draw(suits)

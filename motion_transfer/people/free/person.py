@@ -28,6 +28,7 @@ DARK_CONTRAST = (
     3.0  # of a picture darker than a third, differences are mostly noise: they grow less
 )
 LIGHT_MEAN = 0.75  # of a dye lighter than that, bright threads are not much brighter
+PLAIN = 0.4  # of a printed skirt's differences stay in one that is dyed: its cloth is nearly plain
 
 _NO_TEXTURE = np.zeros((1, 1, 4), np.float32)
 _SIZE_METRES = (1.0, 1.0)  # only relief is measured by it, and an overlay has none
@@ -152,7 +153,7 @@ class _Dressing:
             tint=dye.colour,
             tint_share=dye.share,
             mean=mean,
-            contrast=_contrast(mean, dye.colour),
+            contrast=_contrast(mean, dye.colour) * (PLAIN if item.kind == "skirt" else 1.0),
             cut_out=item.alpha,
         )
 
