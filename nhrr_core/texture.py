@@ -5,6 +5,9 @@ The numbers below are this project's, chosen by eye.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import reduce
+
 import torch
 import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int64, UInt8
@@ -68,14 +71,17 @@ def extract_texture(
     texels = image.shape[0] * size * size
 
     seen = iuv[:, 0] > 0
-    total, count = _scatter(colours[seen], _texel(place, batch, size)[seen], texels)
+    x, y = place.unbind(-1)
+    total, count = _scatter(colours[seen], _texel(x, y, batch, size)[seen], texels)
+    hit = count > 0  # what is interpolated only fills where no pixel landed
+    precise = torch.promote_types(image.dtype, torch.float32)  # float16 is too coarse for places
+    axes = charts.view(-1, 2).T.to(precise).contiguous()
     fill_total, fill_count = torch.zeros_like(total), torch.zeros_like(count)
     for steps, quads in _quads_by_steps(iuv, place, size):
-        points, texel = _fill_points(colours, iuv, charts, quads, steps, size)
+        points, texel = _fill_points(colours, iuv, axes, quads, steps, hit, size)
         more_total, more_count = _scatter(points, texel, texels)
         fill_total, fill_count = fill_total + more_total, fill_count + more_count
 
-    hit = count > 0  # what is interpolated only fills where no pixel landed
     total = torch.where(hit[:, None], total, fill_total)
     count = torch.where(hit, count, fill_count)
     texture = total / count.clamp_min(1)[:, None]
@@ -116,9 +122,11 @@ def merge_textures(
     return texture, visibility
 
 
-def _texel(place: Float[Tensor, "*shape 2"], batch: Tensor, size: int) -> Int64[Tensor, "*shape"]:
+def _texel(
+    x: Float[Tensor, "*shape"], y: Float[Tensor, "*shape"], batch: Tensor, size: int
+) -> Int64[Tensor, "*shape"]:
     """Index of the texel that a place falls in, counted through the batch."""
-    column, row = (place * size).long().clamp(0, size - 1).unbind(-1)
+    column, row = ((axis * size).long().clamp_(0, size - 1) for axis in (x, y))
     return (batch * size + row) * size + column
 
 
@@ -260,47 +268,72 @@ def _quads_by_steps(
 def _fill_points(
     colours: Float[Tensor, "B H W C"],
     iuv: UInt8[Tensor, "B 3 H W"],
-    charts: Float[Tensor, "24 256 256 2"],
+    axes: Float[Tensor, "2 L"],
     quads: Int64[Tensor, "Q 3"],
     steps: int,
+    hit: Bool[Tensor, " M"],
     size: int,
 ) -> tuple[Float[Tensor, "N C"], Int64[Tensor, " N"]]:
-    """Colours and texels of steps x steps points spread evenly inside each quad."""
-    precise = torch.promote_types(colours.dtype, torch.float32)  # float16 is too coarse for places
-    line = (torch.arange(steps, device=iuv.device, dtype=precise) + 0.5) / steps
-    y, x = (axis.reshape(-1) for axis in torch.meshgrid(line, line, indexing="ij"))
-    weights = _bilinear(y, x)
+    """Colours and texels of steps x steps points spread evenly inside each quad.
+
+    Those in texels that are hit, about half of them, are left out.
+    """
+    line = (torch.arange(steps, device=iuv.device, dtype=axes.dtype) + 0.5) / steps
+    down, right = (axis.reshape(-1) for axis in torch.meshgrid(line, line, indexing="ij"))
 
     batch, top, left = quads.unbind(1)
-    corners = [(batch, top + down, left + right) for down in (0, 1) for right in (0, 1)]
-    corner_colours = torch.stack([colours[corner] for corner in corners])
-    corner_iuv = torch.stack([iuv.permute(0, 2, 3, 1)[corner] for corner in corners])
-    values = torch.einsum("kp,kqc->qpc", weights.to(colours.dtype), corner_colours)
-    between = torch.einsum("kp,kqc->qpc", weights, corner_iuv[..., 1:].to(precise))
-    part = corner_iuv[0, :, :1].long().expand(between.shape[:-1])
-    place = _place_between_entries(charts, part, between)
-    return values.flatten(0, 1), _texel(place, batch[:, None], size).flatten()
-
-
-def _bilinear(down: Tensor, right: Tensor) -> Tensor:
-    """Weights of a quad's corners (row by row) at places inside it, each axis in [0, 1]."""
-    return torch.stack(
-        [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
+    corners = [(batch, top + y, left + x) for y in (0, 1) for x in (0, 1)]
+    corner_iuv = [iuv[image, :, row, column] for image, row, column in corners]
+    # no product of matrices, which may be of a few bits only: each place in the table counts
+    u, v = (
+        _bilinear([corner[:, channel, None].to(axes.dtype) for corner in corner_iuv], down, right)
+        for channel in (1, 2)
     )
+    x, y = _place_between_entries(axes, corner_iuv[0][:, :1].long(), u, v)
+    texel = _texel(x, y, batch[:, None], size).flatten()
+    open_texels = (~hit.index_select(0, texel)).nonzero()[:, 0]
+    shares = [(1 - down, down), (1 - right, right)]
+    weights = torch.stack([a * b for a in shares[0] for b in shares[1]], dim=1)
+    corner_colours = torch.stack([colours[corner] for corner in corners], dim=1)
+    values = (weights.to(colours.dtype) @ corner_colours).flatten(0, 1)
+    return values.index_select(0, open_texels), texel.index_select(0, open_texels)
+
+
+def _bilinear(corners: Sequence[Tensor], down: Tensor, right: Tensor) -> Tensor:
+    """Between a quad's corners (row by row), at places inside it, each axis in [0, 1]."""
+    a, b, c, d = corners
+    return torch.lerp(torch.lerp(a, b, right), torch.lerp(c, d, right), down)
 
 
 def _place_between_entries(
-    charts: Float[Tensor, "24 256 256 2"], part: Int64[Tensor, "Q P"], uv: Float[Tensor, "Q P 2"]
-) -> Float[Tensor, "Q P 2"]:
-    """Texture coordinates of fractional (U, V): bilinear in the table, nearest across a seam."""
-    low = uv.floor().clamp(0, CHART_SIZE - 2)  # 255 has no entry above it
-    (right, down), (u, v) = (uv - low).unbind(-1), low.long().unbind(-1)
-    table = charts.view(-1, 2)
-    first = chart_index(part, u, v)
-    corners = torch.stack([table[first + (y * CHART_SIZE + x)] for y in (0, 1) for x in (0, 1)])
-    weights = _bilinear(down, right)
-    smooth = (corners.amax(0) - corners.amin(0)).amax(-1, keepdim=True) <= MAX_ENTRY_STEP
-    u, v = uv.round().long().unbind(-1)
-    return torch.where(
-        smooth, (weights[..., None] * corners).sum(0), table[chart_index(part, u, v)]
-    )
+    axes: Float[Tensor, "2 L"],
+    part: Int64[Tensor, "Q 1"],
+    u: Float[Tensor, "Q P"],
+    v: Float[Tensor, "Q P"],
+) -> list[Float[Tensor, "Q P"]]:
+    """Texture coordinates x and y of fractional U and V.
+
+    They are bilinear in the table, and the nearest entry's across a seam.
+
+    Args:
+        axes: The table's x, and its y: in a column of numbers many are looked up fastest.
+    """
+    left, top = (axis.floor().clamp_(0, CHART_SIZE - 2) for axis in (u, v))  # 255 is the last entry
+    chart = chart_index(part, *torch.zeros_like(part).expand(2, -1, -1))
+    first = (chart + (top * CHART_SIZE + left).long()).flatten()
+    places, smooth = [], torch.ones_like(first, dtype=torch.bool)
+    for axis in axes:
+        # entries further on are looked up from a later beginning: that needs no sum for each point
+        corners = [
+            axis[y * CHART_SIZE + x :].index_select(0, first) for y in (0, 1) for x in (0, 1)
+        ]
+        highest, lowest = (reduce(extreme, corners) for extreme in (torch.maximum, torch.minimum))
+        smooth &= highest - lowest <= MAX_ENTRY_STEP
+        corners = [corner.view_as(u) for corner in corners]
+        places.append(_bilinear(corners, v - top, u - left).flatten())
+    seam = (~smooth).nonzero()[:, 0]
+    nearest = (chart + (v.round() * CHART_SIZE + u.round()).long()).flatten()[seam]
+    return [
+        place.index_copy(0, seam, axis[nearest]).view_as(u)
+        for axis, place in zip(axes, places, strict=True)
+    ]
