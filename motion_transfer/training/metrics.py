@@ -167,10 +167,10 @@ def lattice_energy(image: Image, corners: Int[np.ndarray, "N 2"]) -> tuple[float
 
     Such lattices are what networks that up-sample leave behind ("checkerboard artifacts"; Odena et
     al., Distill 2016). Of each window's power spectrum (Hann window, plane removed) the bins of
-    that period along x, along y, and along both count, less what the bins around them let expect:
-    their median over ln 2, the mean of noise with that median. A lattice of the form
-    a cos(2 pi x / p) has a^2 / 2 (p = 2: a^2); what is smooth and white noise have about 0, to
-    either side of it. The mean over windows and channels.
+    that period along x, along y, and along both count, less what the bins 2 nearer to and 2 further
+    from the middle of the spectrum let expect there, if power falls as a power of the frequency, as
+    it does for edges. A lattice of the form a cos(2 pi x / p) has a^2 / 2 (p = 2: a^2); what is
+    smooth and white noise have about 0, to either side of it. The mean over windows and channels.
 
     Args:
         corners: Those of `flat_windows`; the picture has the reference's size.
@@ -186,10 +186,10 @@ def lattice_energy(image: Image, corners: Int[np.ndarray, "N 2"]) -> tuple[float
     found = []
     for period in LATTICE_PERIODS:
         step = LATTICE_WINDOW // period
-        places = {0, step, LATTICE_WINDOW - step}
-        bins = [(row, column) for row in places for column in places if (row, column) != (0, 0)]
+        signs = (0, 1) if period == 2 else (0, 1, -1)  # half the sampling rate is its own mirror
+        ways = [(down, right) for down in signs for right in signs if down or right]
         # not of the mean spectrum: it is single spectra of noise whose bins are so spread
-        found.append(sum((power[..., r, c] - _expected(power, r, c)).mean() for r, c in bins))
+        found.append(sum(_excess(power, step, *way).mean() for way in ways))
     return found[0], found[1], found[2]
 
 
@@ -248,16 +248,22 @@ def _without_plane(windows: Float[np.ndarray, "N 3 S S"]) -> Float[np.ndarray, "
     return rest - across - down
 
 
-def _expected(power: Float[np.ndarray, "N 3 S S"], row: int, column: int) -> np.ndarray:
-    """The power of a bin as its neighbours tell it: those 2 and 3 bins away.
+def _excess(power: Float[np.ndarray, "N 3 S S"], step: int, down: int, right: int) -> np.ndarray:
+    """How far the bin `step` bins down and right stands out of the line from the middle to it.
 
-    The nearest ones share a lattice's power, as a Hann window spreads it over three bins.
+    The next bins share a lattice's power, as a Hann window spreads it over three; those 2 away do
+    not. Between them the expectation is linear in logarithms. Bins of white noise are distributed
+    exponentially: the mean of x^a is its mean to the power of a, times the gamma function of 1 + a.
     """
-    size, near = power.shape[-1], np.arange(-3, 4)
-    down, right = np.meshgrid(near, near, indexing="ij")
-    ring = np.maximum(np.abs(down), np.abs(right)) >= 2
-    around = power[..., (row + down[ring]) % size, (column + right[ring]) % size]
-    return np.median(around, axis=-1) / math.log(2)
+    nearer, own, further = (
+        power[..., (down * each) % LATTICE_WINDOW, (right * each) % LATTICE_WINDOW]
+        for each in (step - 2, step, step + 2)
+    )
+    if step == LATTICE_WINDOW // 2:
+        return own - nearer  # the one further is its mirror image
+    weight = math.log(step / (step - 2)) / math.log((step + 2) / (step - 2))
+    bias = math.gamma(2 - weight) * math.gamma(1 + weight)
+    return own - nearer ** (1 - weight) * further**weight / bias
 
 
 def _mean(values: Float[np.ndarray, "H W"], mask: Mask | None) -> float:

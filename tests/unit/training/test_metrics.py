@@ -240,6 +240,15 @@ def test_what_is_smooth_and_noise_have_no_lattice() -> None:
     assert lattice_energy(both, ANYWHERE)[1] == pytest.approx(18, abs=1)
 
 
+@pytest.mark.parametrize("slope", [0.0, 0.3, 1.0])
+def test_an_edge_is_no_lattice(slope: float) -> None:
+    """A step of 60 levels, whose own mean square is 900."""
+    y, x = np.mgrid[:160, :160]
+    picture = rounded(90 + 60 * (x - slope * y > 40)[..., None] + np.zeros(3))
+    found = lattice_energy(picture, ANYWHERE)
+    assert min(found) > -5 and max(found) < 1
+
+
 def test_lattices_are_looked_for_where_the_target_is_flat() -> None:
     reference = rounded(shaded() + lattice(8, 40, across=True, down=False))
     mask = np.zeros((160, 160), bool)
