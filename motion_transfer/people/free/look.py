@@ -1,4 +1,4 @@
-"""What a free person looks like: which items, in which colours, and what of today's goes with them.
+"""What a free person looks like: which items, in which colours, and what of the project's own.
 
 Shares are chosen by eye, so that crowds look like those of streets and catalogues. Names that
 stand here are those of MakeHuman's items; a folder without them does without what they say.

@@ -50,6 +50,9 @@ LOGOS: dict[str, tuple[Logo, ...]] = {
 }
 """Item -> what is painted over."""
 
+DARKEST_FOLD = 0.5
+"""Occlusion below that is no fold, but the shirt that lies over trousers until somebody sits."""
+
 SKIN_GREY = 0.12
 """Skins are photographs under warm light; so much grey makes them neutral."""
 
@@ -72,7 +75,7 @@ def load_picture(item: Item, role: str, assets: Assets) -> Picture:
         rgb = _painted_over(rgb, logo)
     if "ao" in item.pictures:
         folds = cv2.resize(_read(item, "ao")[0], rgb.shape[1::-1]).astype(np.float32) / 255
-        rgb = np.rint(rgb * folds).astype(np.uint8)
+        rgb = np.rint(rgb * np.maximum(folds, DARKEST_FOLD)).astype(np.uint8)
     if not item.alpha:
         alpha = np.full(rgb.shape[:2], 255, np.uint8)
     return Picture.of(np.dstack([rgb, alpha]))

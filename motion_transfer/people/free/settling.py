@@ -29,9 +29,9 @@ from motion_transfer.people.head.skin_atlas import unit
 HINGE_METRES = 0.02  # above the head's joint, which lies between the ears
 LOOSE_METRES = 0.10  # below the hinge, from where on hair hangs freely
 CLEAR_METRES = 0.008  # between skin and hair
-LONGEST_PUSH = 0.08  # what is deeper is on the other side of the body
+LONGEST_PUSH = 0.08  # in a round: what is deeper may be on the other side of the body
 ROUNDS = 3  # of pushing out and smoothing
-SPREADS = 4  # how far a push takes hair around it along, in edges of its mesh
+SPREADS = 4  # how far a push takes along what is around it, in edges of the mesh
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,8 @@ def hang_skirt(points: Points, body: Body, surface: BodySurface) -> HungSkirt:
 
     def settle(posed: Points, around: PosedBody) -> Points:
         hung = shape.weights.pose(shape.points, around.transforms)
-        return (posed + into @ (move(hung, around) - hung)).astype(np.float32)
+        moved = _widened((move(hung, around) - hung).reshape(ROWS, COLUMNS, 3))
+        return (posed + into @ moved.reshape(-1, 3)).astype(np.float32)
 
     return HungSkirt(SkinWeights(csr_array(into @ shape.weights.matrix)), settle)
 
@@ -105,6 +106,18 @@ def _into_grid(angle: np.ndarray, z: np.ndarray, heights: np.ndarray) -> csr_arr
     return csr_array(coo_array(entries, shape=(len(z), ROWS * COLUMNS)))
 
 
+def _widened(
+    moved: Float32[np.ndarray, "rows columns 3"],
+) -> Float32[np.ndarray, "rows columns 3"]:
+    """Move each column as far as the one within two of it that moves most.
+
+    The cage is coarse: where a leg meets one column and just misses the next, it would show.
+    """
+    choices = np.stack([np.roll(moved, step, 1) for step in (0, 1, -1, 2, -2)])
+    most = (choices**2).sum(-1).argmax(0)
+    return np.take_along_axis(choices, most[None, ..., None], 0)[0]
+
+
 def hang_hair(points: Points, faces: Faces, body: Body, model: BodyModel) -> Settle | None:
     """Make what lets long hair hang; None for hair that ends at the ears.
 
@@ -115,56 +128,48 @@ def hang_hair(points: Points, faces: Faces, body: Body, model: BodyModel) -> Set
     below = (hinge[2] - points[:, 2]).astype(np.float32)
     if below.max() < LOOSE_METRES:
         return None
-    return _Hanging(
-        rest=points,
-        loose=ramp(below, 0.0, LOOSE_METRES),
-        below=np.maximum(below, 0),
-        mean=_neighbours(faces, len(points)),
-        skin=obstacle(body, model),
-        head=model.skeleton.index["head"],
-    )
+    loose = ramp(below, 0.0, LOOSE_METRES)
+    down = np.maximum(below, 0)[:, None] * np.array([0, 0, -1], np.float32)
+    head = model.skeleton.index["head"]
+    skin = _Clearance(obstacle(body, model), _neighbours(faces, len(points)), loose)
+
+    def settle(posed: Points, around: PosedBody) -> Points:
+        # each point hangs from the one above it at the hinge's height, which goes with the head
+        turned = around.transforms[head][:, :3]
+        return skin.push(posed + loose[:, None] * (down - down @ turned.T), around)
+
+    return settle
 
 
 @dataclass(frozen=True)
-class _Hanging:
-    """Lets hair hang that was posed with the head.
+class _Clearance:
+    """Keeps posed points outside of the skin.
 
     Attributes:
-        rest: V x 3.
-        loose: V, 0 what keeps to the head .. 1 what hangs freely.
-        below: V, metres that a point lies below the hinge.
+        skin: What they keep clear of.
         mean: V x V, gives each point the mean of its neighbours.
-        skin: What it keeps clear of.
-        head: The number of the head's bone.
+        free: V, how far each may be pushed, 0 not at all .. 1.
     """
 
-    rest: Points
-    loose: Float32[np.ndarray, " V"]
-    below: Float32[np.ndarray, " V"]
-    mean: csr_array
     skin: Obstacle
-    head: int
+    mean: csr_array
+    free: Float32[np.ndarray, " V"]
 
-    def __call__(self, points: Points, body: PosedBody) -> Points:
-        turned = body.transforms[self.head][:, :3]
-        # each point hangs from the one above it at the hinge's height, which goes with the head
-        drop = self.below[:, None] * np.array([0, 0, -1], np.float32)
-        out = points + self.loose[:, None] * (drop - drop @ turned.T)
+    def push(self, points: Points, body: PosedBody) -> Points:
         placed = body.points[self.skin.index]
-        matrix = (self.skin.weights.matrix @ body.transforms[:, :, :3].reshape(-1, 9)).reshape(
-            -1, 3, 3
-        )
-        outward = unit((matrix @ self.skin.normals[:, :, None])[..., 0])
+        turns = self.skin.weights.matrix @ body.transforms[:, :, :3].reshape(-1, 9)
+        outward = unit((turns.reshape(-1, 3, 3) @ self.skin.normals[:, :, None])[..., 0])
         tree = cKDTree(placed, balanced_tree=False, compact_nodes=False)
-        own = np.flatnonzero(self.loose > 0)
+        own = np.flatnonzero(self.free > 0)
+        out = points
         for _ in range(ROUNDS):
             _, near = tree.query(out[own])
             normal = outward[near]
             depth = CLEAR_METRES - ((out[own] - placed[near]) * normal).sum(1)
             push = np.zeros_like(out)
-            push[own] = (np.clip(depth, 0, LONGEST_PUSH) * self.loose[own])[:, None] * normal
+            push[own] = (np.clip(depth, 0, LONGEST_PUSH) * self.free[own])[:, None] * normal
             spread = push
-            for _ in range(SPREADS):  # hair around what is pushed goes along
+            for _ in range(SPREADS):  # what is around goes along
                 spread = self.mean @ spread
                 further = (spread**2).sum(1) < (push**2).sum(1)
                 spread = np.where(further[:, None], push, spread)
