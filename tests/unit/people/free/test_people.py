@@ -64,6 +64,7 @@ def test_nobody_in_training_wears_what_is_held_out(assets):
 
 def test_a_description_tells_kind_and_items(assets):
     person = PeopleStream(assets=assets, free_share=1.0).person(1)
+    assert isinstance(person, FreePerson)
     told = json.loads(json.dumps(person.description()))
     assert told["kind"] == "free" and told["look"]["skin"] == person.look.skin
     assert told["shape"]["age"] == person.shape.age

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,7 +62,7 @@ def test_a_protocol_of_free_people_is_another_one_with_other_assets(assets):
 
 
 def test_the_protocol_needs_assets(assets, tmp_path):
-    common = {"protocol": "free-people", "renderer": "texture", "output": tmp_path}
+    common: dict[str, Any] = {"protocol": "free-people", "renderer": "texture", "output": tmp_path}
     with pytest.raises(InputError, match="protocol free-people needs assets; name their folder"):
         EvaluationOptions(**common)
     with pytest.raises(InputError, match="no such folder"):

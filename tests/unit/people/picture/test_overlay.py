@@ -103,7 +103,9 @@ def test_what_is_cut_out_shows_what_is_behind():
 
 
 def test_normals_bend_the_light():
-    lamp = Light((Lamp(np.pi / 2, 0.0, (1.0, 1.0, 1.0)),), (0.0,) * 3, (0.0,) * 3)  # from the right
+    lamp = Light(
+        (Lamp(np.pi / 2, 0.0, (1.0, 1.0, 1.0)),), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    )  # from the right
     flat = drawn(Overlay(plain(200, 200, 200), plain(128, 128, 255)), lamp)[32, 32, 0]
     right = drawn(Overlay(plain(200, 200, 200), plain(220, 128, 200)), lamp)[32, 32, 0]
     assert flat < 0.05 < 0.2 < right
