@@ -60,8 +60,7 @@ SKIN_EVENED = 0.5
 """Of the slow changes of brightness over a skin, which are light and not skin, this share goes."""
 
 SKIN_BLUR = 0.06
-"""How slow a change of brightness is that counts as light, a share of the picture's side; it is
-looked for on the whole body, left and right alike, so that no side is darker in all poses."""
+"""How slow a change of brightness is that counts as light, a share of the picture's side."""
 
 
 @lru_cache(maxsize=96)
