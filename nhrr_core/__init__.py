@@ -5,7 +5,7 @@ Tensors in, tensors out: no files, no devices chosen, nothing printed.
 
 from nhrr_core.clearance import unfold_clearance
 from nhrr_core.config import PRESETS, VARIANTS, ModelConfig
-from nhrr_core.discriminator import Discriminator
+from nhrr_core.discriminator import Discriminator, Verdict
 from nhrr_core.errors import ConfigError, IuvError, NhrrError, ShapeError
 from nhrr_core.fast_render_net import FastRenderNet
 from nhrr_core.feature_net import FeatureNet
@@ -17,7 +17,9 @@ from nhrr_core.losses import (
     discriminator_loss,
     face_identity_loss,
     generator_loss,
+    matching_loss,
     perceptual_loss,
+    r1_penalty,
     texture_loss,
 )
 from nhrr_core.model import NeuralReRenderer
@@ -51,6 +53,7 @@ __all__ = [
     "RenderNet",
     "ShapeError",
     "UVLayout",
+    "Verdict",
     "adversarial_loss",
     "alpha_loss",
     "check_iuv",
@@ -61,11 +64,13 @@ __all__ = [
     "generator_loss",
     "keep_parts",
     "load_uv_layout",
+    "matching_loss",
     "measure_surroundings",
     "merge_textures",
     "mirror_texture",
     "normalise_iuv",
     "perceptual_loss",
+    "r1_penalty",
     "sample_features",
     "shrink_texture",
     "texture_coordinates",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 import torch.nn.functional as F
 from jaxtyping import Float
@@ -11,6 +13,18 @@ from nhrr_core.errors import ShapeError
 
 SLOPE = 0.2  # of LeakyReLU, Pix2PixHD's
 INITIAL_STD = 0.02  # of the convolutions' weights, Pix2PixHD's
+
+
+class Verdict(NamedTuple):
+    """What one scale says of images.
+
+    Attributes:
+        logits: B x 1 x h x w, one for each patch, above 0 for real.
+        features: The activations of the four layers before, the first one's first.
+    """
+
+    logits: Float[Tensor, "B 1 h w"]
+    features: list[Float[Tensor, "B _ _ _"]]
 
 
 class PatchDiscriminator(nn.Module):
@@ -36,9 +50,14 @@ class PatchDiscriminator(nn.Module):
                 nn.init.normal_(layer.weight, std=INITIAL_STD)
         self.layers = nn.Sequential(*layers)
 
-    def forward(self, pair: Float[Tensor, "B C H W"]) -> Float[Tensor, "B 1 h w"]:
-        """Compute logits, above 0 for real; sides of about H / 8 and W / 8."""
-        return self.layers(pair)
+    def forward(self, pair: Float[Tensor, "B C H W"]) -> Verdict:
+        """Judge patches; the sides of the logits are about H / 8 and W / 8."""
+        features, x = [], pair
+        for layer in self.layers:
+            x = layer(x)
+            if isinstance(layer, nn.LeakyReLU):
+                features.append(x)
+        return Verdict(x, features)
 
 
 class Discriminator(nn.Module):
@@ -51,8 +70,8 @@ class Discriminator(nn.Module):
         condition_channels: Those of the feature image, `ModelConfig.render_inputs`.
         width: Channels of the first convolution.
         scales: How many there are; the paper has three.
-    Source: the paper, Sec. 3.4 and 3.5; layers and initial weights from Pix2PixHD. Its features
-        between the layers are not returned: the paper has no feature matching.
+    Source: the paper, Sec. 3.4 and 3.5; layers and initial weights from Pix2PixHD, and so are the
+        features, which the paper makes no use of.
     """
 
     def __init__(
@@ -66,8 +85,8 @@ class Discriminator(nn.Module):
 
     def forward(
         self, image: Float[Tensor, "B K H W"], condition: Float[Tensor, "B C h w"]
-    ) -> list[Float[Tensor, "B 1 _ _"]]:
-        """Compute each scale's logits, the finest first; no sigmoid.
+    ) -> list[Verdict]:
+        """Compute each scale's logits, without sigmoid, and features, the finest scale first.
 
         Args:
             image: Real or generated, in [-1, 1].
@@ -79,9 +98,9 @@ class Discriminator(nn.Module):
                 f"image {list(image.shape)} and feature image {list(condition.shape)} do not match"
             )
         pair = torch.cat([image, condition], dim=1)
-        logits = []
+        verdicts: list[Verdict] = []
         for scale in self.scales:
-            if logits:
+            if verdicts:
                 pair = F.avg_pool2d(pair, 3, stride=2, padding=1, count_include_pad=False)
-            logits.append(scale(pair))
-        return logits
+            verdicts.append(scale(pair))
+        return verdicts

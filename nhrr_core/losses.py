@@ -24,7 +24,8 @@ class LossWeights:
 
     Raises: ConfigError if one is negative or not finite.
     Source: the paper, Sec. 3.5. Departs from it: `alpha`, of the optional coverage channel, and
-        `head`, the perceptual distance of the enlarged head, are this project's.
+        `head`, the perceptual distance of the enlarged head, are this project's; `matching` is
+        Pix2PixHD's.
     """
 
     perceptual: float = 10.0
@@ -33,6 +34,7 @@ class LossWeights:
     texture: float = 1.0
     alpha: float = 10.0
     head: float = 0.0
+    matching: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -88,6 +90,49 @@ def adversarial_loss(fake: Sequence[Float[Tensor, "B 1 _ _"]]) -> Float[Tensor, 
     """
     _check_same_number(fake, fake, "scales")
     return torch.stack([_cross_entropy(logits, 1.0) for logits in fake]).sum()
+
+
+def matching_loss(
+    generated: Sequence[Sequence[Float[Tensor, "B _ _ _"]]],
+    truth: Sequence[Sequence[Float[Tensor, "B _ _ _"]]],
+) -> Float[Tensor, ""]:
+    """Compute how far the discriminator's features of generated and real images are apart.
+
+    Mean over scales of the sum over layers of mean|D_j(generated) - D_j(truth)|.
+
+    Args:
+        generated, truth: `Verdict.features` of each scale; take the truth's without gradients.
+    Raises: ShapeError if the numbers of scales, or of a scale's layers, differ or are 0.
+    Source: Pix2PixHD (Wang et al., CVPR 2018), feature matching; its weight is 10. The paper has
+        no such loss.
+    """
+    _check_same_number(generated, truth, "scales")
+    terms = []
+    for ours, theirs in zip(generated, truth, strict=True):
+        _check_same_number(ours, theirs, "layers")
+        terms += [F.l1_loss(our, their) for our, their in zip(ours, theirs, strict=True)]
+    return torch.stack(terms).sum() / len(generated)
+
+
+def r1_penalty(
+    real: Sequence[Float[Tensor, "B 1 _ _"]], image: Float[Tensor, "B K H W"]
+) -> Float[Tensor, ""]:
+    """Compute R1: half of the squared length of the discriminator's gradient at real images.
+
+    The gradient is of the sum of an image's logits, over patches and scales, with respect to that
+    image; the penalty is a mean over the batch, and differentiable itself.
+
+    Args:
+        real: The logits of `Discriminator`, of real images.
+        image: Those images, which require gradients.
+    Raises: ShapeError if there is no scale.
+    Source: Mescheder et al., ICML 2018, Eq. 9; the sum over patches as LaMa's (Suvorov et al., WACV
+        2022). The paper has no such loss.
+    """
+    _check_same_number(real, real, "scales")
+    total = torch.stack([logits.float().sum() for logits in real]).sum()
+    (gradient,) = torch.autograd.grad(total, image, create_graph=True)
+    return gradient.square().sum((1, 2, 3)).mean() / 2
 
 
 def perceptual_loss(

@@ -82,6 +82,7 @@ def train(
     mt train --data pairs.csv --images photos/ --vgg19 vgg19-dcbb9e9d.pth \\
              --sphereface sphere20a.pth -o deepfashion/
     mt train --init run/weights.safetensors --data my_frames/ --no-identity -o me/
+    mt train --init lite --people 0 --minutes 8 -o gpu/
     accelerate launch --multi-gpu -m motion_transfer train --config train.toml -o run/
 
     A run that is stopped (Ctrl-C, SIGTERM) writes a checkpoint first. Several devices are started
@@ -108,8 +109,7 @@ def train(
     quiet = quiet or not leads
     if not quiet:
         click.echo(write_toml(planned.config), err=True)
-    steps = planned.config.run.steps
-    with Progress(steps, quiet=quiet) as progress:
+    with Progress(quiet=quiet) as progress:
         trainer = _prepare(planned, progress, quiet=quiet)
         with stop_on_signals() as stop:
             result = trainer.train(stop.asked)
@@ -119,7 +119,10 @@ def train(
             f" {result.wait_share:.0%} of the time waiting for data"
         )
     if result.stopped:
-        stop.end(f"{result.step} of {steps}; go on with mt train --resume {planned.folder}", leads)
+        run = planned.config.run
+        whole = f"{run.minutes:g} minutes" if run.minutes else f"{run.steps}"
+        where = f"{result.step}, {result.progress:.0%} of {whole}"
+        stop.end(f"{where}; go on with mt train --resume {planned.folder}", leads)
 
 
 def _settings_of(options: dict[str, Any]) -> dict[str, Any]:
@@ -168,8 +171,8 @@ def _prepare(planned: Any, progress: Progress, *, quiet: bool) -> Any:
 class Progress:
     """A bar on a terminal, and a line for each log event where there is none."""
 
-    def __init__(self, steps: int, *, quiet: bool) -> None:
-        self._quiet, self._steps = quiet, steps
+    def __init__(self, *, quiet: bool) -> None:
+        self._quiet = quiet
         self._bar: tqdm | None = None
 
     def __enter__(self) -> Self:
@@ -191,11 +194,14 @@ class Progress:
             terms = " ".join(f"{name} {value:.4f}" for name, value in event.terms.items())
             rate = f"{event.samples_per_second:.2f} samples/s, waiting {event.wait_share:.0%}"
             if not sys.stderr.isatty():
-                click.echo(f"step {event.step}/{self._steps}: {terms}; {rate}", err=True)
+                where = f"/{event.steps}" if event.steps else f", {event.progress:.0%}"
+                click.echo(f"step {event.step}{where}: {terms}; {rate}", err=True)
                 return
             if self._bar is None:
-                self._bar = tqdm(total=self._steps, unit="step", dynamic_ncols=True, leave=False)
+                self._bar = tqdm(total=event.steps, unit="step", dynamic_ncols=True, leave=False)
                 self._bar.n = self._bar.last_print_n = event.step
+            if event.steps is None:
+                self._bar.set_description(f"{event.progress:.0%}", refresh=False)
             self._bar.set_postfix_str(f"{terms}; {rate}", refresh=False)
             self._bar.update(event.step - self._bar.n)
 
@@ -289,7 +295,7 @@ def fit(data: Path, run: Path, quiet: bool, **options: Any) -> None:
     given = {name: value for name, value in options.items() if value is not None}
     training = IuvTraining(data, run, TrainingSettings(**given))
     steps = training.settings.steps
-    with Progress(steps, quiet=quiet) as progress, stop_on_signals() as stop:
+    with Progress(quiet=quiet) as progress, stop_on_signals() as stop:
         stopped = training.train(progress, stop.asked)
     if stopped:
         stop.end(f"{training.step} of {steps}; the same command goes on", not quiet)

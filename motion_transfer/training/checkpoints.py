@@ -4,7 +4,7 @@ RUN/checkpoints/step_000500/
     model.safetensors, average.safetensors   each renders with `mt run` as it is
     discriminator.safetensors                where there is one
     optimisers.pt, random.pt                 tensors and plain values (`weights_only`)
-    state.json                               step and the data's digest
+    state.json                               step, seconds of training, the data's digest
 
 Each model says in its notes what it was trained on, how, and under which licence.
 """
@@ -69,10 +69,18 @@ def list_steps(run: Path) -> list[int]:
 
 
 def write_state(
-    run: Path, step: int, state: RunState, *, data_digest: str, notes: Mapping[str, str]
+    run: Path,
+    step: int,
+    state: RunState,
+    *,
+    seconds: float,
+    data_digest: str,
+    notes: Mapping[str, str],
 ) -> Path:
     """Write a checkpoint under a temporary name, then give it its own.
 
+    Args:
+        seconds: How long the run has trained for.
     Raises: OutputError where the disk is full or the place cannot be written.
     """
     final = checkpoint_folder(run, step)
@@ -90,16 +98,17 @@ def write_state(
         if torch.cuda.is_available():
             random["cuda"] = torch.cuda.get_rng_state()
         torch.save(random, work / "random.pt")
-        content = {"step": step, "data": data_digest}
+        content = {"step": step, "seconds": seconds, "data": data_digest}
         (work / STATE).write_text(json.dumps(content, indent=1) + "\n")
         work.chmod(0o755)  # a temporary folder is its owner's alone
         publish(work, final)
     return final
 
 
-def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> None:
+def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> float:
     """Fill the networks and optimisers, and set torch's random state, from a checkpoint.
 
+    Returns: The seconds that the run had trained for; 0 where an older version wrote it.
     Raises: InputError or WeightsError if it is damaged or belongs to other data.
     """
     folder = checkpoint_folder(run, step)
@@ -123,6 +132,7 @@ def read_state(run: Path, step: int, state: RunState, *, data_digest: str) -> No
         torch.set_rng_state(random["cpu"])
         if "cuda" in random and torch.cuda.is_available():
             torch.cuda.set_rng_state(random["cuda"])
+        return float(content.get("seconds", 0))
     except (*damages, WeightsError) as error:
         raise InputError(
             f"checkpoint {folder} is damaged ({first_line(error)}); remove the folder to go on from"

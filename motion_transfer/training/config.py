@@ -29,7 +29,7 @@ Factor = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Decay = Annotated[float, Field(ge=0, lt=1)]
 Perceptual = Literal["efficientnet-lite0", "vgg19", "none"]
-Identity = Literal["sphereface", "none"]
+Identity = Literal["sphereface", "dlib", "none"]
 Precision = Literal["auto", "fp32", "bf16"]
 
 LOSSES = "Losses (the paper's; one without its network is an error)"
@@ -42,12 +42,25 @@ PEOPLE_RECIPE: dict[str, Any] = {
     "model.alpha": True,
     "losses.identity": "none",
     "losses.head_weight": 3.0,
+    "losses.matching_weight": 1.0,
+    "losses.r1_weight": 0.002,
     "losses.adversarial_from": 0.85,
     "optimiser.half_size": 0.7,
 }
 """What synthetic people change: they come with alpha, and are trained on without any file, on
 whatever machine there is. Departs from the paper: no face identity loss, as no weights of
-SphereFace may be shipped; most steps are made at half size, and the discriminator joins late."""
+SphereFace may be shipped; most steps are made at half size, and the discriminator joins late, held
+by feature matching, about as large a term as the perceptual one, and by R1, as weak as in LaMa
+(Suvorov et al., WACV 2022: 0.001 without the half), whose discriminator is Pix2PixHD's, too."""
+
+GPU_RECIPE: dict[str, Any] = {
+    "optimiser.batch_size": 48,
+    "optimiser.learning_rate": 4e-4,
+    "optimiser.decay_from": 2 / 3,
+    "optimiser.ema_decay": 0.998,
+}
+"""What people change besides on a GPU. In a trial of 430 s on one H100 this batch filled it, at 210
+samples a second; the average forgets in as many seconds as one of 0.999 does with smaller ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +69,14 @@ class RunSettings:
 
     steps: Count = option(
         "--steps", "Run", "Updates in all; default 100000.", kind="integer", default=100_000
+    )
+    minutes: Factor = option(
+        "--minutes",
+        "Run",
+        "Train for so long instead of so many steps.",
+        kind="number",
+        default=0.0,
+        metavar="M",
     )
     seed: Number = option(
         "--seed", "Run", "Of weights, order and crops; default 0.", kind="integer", default=0
@@ -92,8 +113,11 @@ class DataSettings:
         background: The colour behind targets whose alpha is known; `photo` leaves them as they are.
         jitter: By up to which share of its side a crop is larger than the renderer's, and shifted
             within that; a driver's crop holds all of its poses and is larger, too.
-        people: 0: two photos each of ever new ones, made while training goes on.
+        people: 0: ever new ones, painted while training goes on.
         views: Photos of each, `size_px` high and wide.
+        pool: How many of the ever new ones are kept, as far as there is memory.
+        draws: How often each of them is drawn on average, before painters go on; by default as
+            often as there are ordered pairs of its views.
         people_seed: Who they are, if they are kept; `run.seed` decides the order of their pairs.
         noise: The share of the photos of people whose IUV has the faults of DensePose's.
         moments: Frames of a clip that are targets, two in a row for each.
@@ -116,6 +140,8 @@ class DataSettings:
         "--people", "Data", "How many; default 64, 0 for ever new ones.", kind="integer", default=64
     )
     views: Annotated[int, Field(ge=2)] = 4
+    pool: Count = 8192
+    draws: Count = 12
     size_px: Annotated[int, Field(ge=32)] = 256
     people_seed: Number = 0
     noise: Share = 0.5
@@ -154,8 +180,10 @@ class LossSettings:
     Attributes:
         perceptual, identity: `none` leaves the loss out.
         vgg19_file: Empty: where torchvision keeps it.
-        adversarial_from: The share of the steps after which the discriminator joins.
-        *_weight: The lambdas. Source: the paper, Sec. 3.5; alpha's and head's are this project's.
+        adversarial_from: The share of the run after which the discriminator joins.
+        *_weight: The lambdas. Source: the paper, Sec. 3.5; alpha's and head's are this project's,
+            matching's is Pix2PixHD's.
+        r1_weight: Gamma, of the penalty on the discriminator's gradient (`nhrr_core.r1_penalty`).
     """
 
     perceptual: Perceptual = option(
@@ -168,7 +196,13 @@ class LossSettings:
     vgg19_file: str = option(
         "--vgg19", LOSSES, "VGG-19's weights; chooses it as well.", default="", metavar="FILE"
     )
-    identity: Identity = "sphereface"
+    identity: Identity = option(
+        "--identity",
+        LOSSES,
+        "sphereface (the paper's) or dlib (from `mt models fetch --faces`).",
+        default="sphereface",
+        metavar="NAME",
+    )
     sphereface_file: str = option(
         "--sphereface", LOSSES, "Weights for the face loss.", default="", metavar="FILE"
     )
@@ -182,6 +216,8 @@ class LossSettings:
     texture_weight: Factor = 1.0
     alpha_weight: Factor = 10.0
     head_weight: Factor = 0.0
+    matching_weight: Factor = 0.0
+    r1_weight: Factor = 0.0
 
     @property
     def weights(self) -> LossWeights:
@@ -197,14 +233,14 @@ class OptimiserSettings:
     """Adam, for both players. Source: the paper, Sec. 3.5; batch and average are this project's.
 
     Attributes:
-        decay_from: The share of the steps after which the learning rate falls in a straight line,
-            to nothing after the last one; 1: it stays as it is. Source: Pix2PixHD, where it is 0.5;
-            the paper says nothing of it.
+        decay_from: The share of the run after which the learning rate falls in a straight line,
+            to nothing at the end; 1: it stays as it is. Source: Pix2PixHD, where it is 0.5; the
+            paper says nothing of it.
         accumulation: Batches whose gradients make one step.
         ema_decay: Of the averaged weights, which are what is exported; 0: no average.
-        half_size: The share of the steps, the first ones, at half the sides of textures and images:
+        half_size: The share of the run, its beginning, at half the sides of textures and images:
             a quarter of the work.
-        inpainting: The share of the steps that are the first stage of `ip`.
+        inpainting: The share of the run that is the first stage of `ip`.
     """
 
     learning_rate: Factor = 2e-4
@@ -230,7 +266,8 @@ class SpeedSettings:
 
     Attributes:
         precision: `auto` is bf16 where the hardware multiplies it, else fp32.
-        workers: -1: half of the cores, at most 4; 0: the process that trains reads as well.
+        workers: -1: half of the cores, at most 4, or all but one for ever new people beside a GPU;
+            0: the process that trains reads, or paints, as well.
     """
 
     precision: Precision = "auto"
@@ -240,7 +277,7 @@ class SpeedSettings:
     workers: Annotated[int, Field(ge=-1)] = option(
         "--workers",
         "Speed",
-        "Processes that read data; default: half of the cores.",
+        "Processes that read or paint; default: half of the cores.",
         kind="integer",
         default=-1,
     )
@@ -308,31 +345,37 @@ class TrainConfig:
                         f" model.{key}, {side}, is no multiple of {multiple}; set half_size to 0"
                     )
 
+    def progress(self, step: int, seconds: float) -> float:
+        """Tell the share of the run that is done after so many steps, or so long; from 0 to 1.
+
+        The clock counts where `run.minutes` are given, steps otherwise.
+        """
+        if self.run.minutes:
+            return min(1.0, seconds / (self.run.minutes * 60))
+        return min(1.0, step / self.run.steps)
+
     @property
     def half_size_steps(self) -> int:
-        """Steps at half the sides."""
+        """Steps at half the sides, where steps count."""
         return round(self.run.steps * self.optimiser.half_size)
 
-    @property
-    def adversarial_start(self) -> int:
-        """Steps before the discriminator joins."""
-        return round(self.run.steps * self.losses.adversarial_from)
+    def is_adversarial(self, progress: float) -> bool:
+        """Tell whether the discriminator takes part by then."""
+        return progress >= self.losses.adversarial_from
 
-    @property
-    def inpainting_steps(self) -> int:
-        """Steps of the first stage; 0 for all variants but `ip`."""
-        share = self.optimiser.inpainting if self.model.variant == "ip" else 0
-        return round(self.run.steps * share)
+    def is_inpainting(self, progress: float) -> bool:
+        """Tell whether that is the first stage of `ip`; other variants have none."""
+        return self.model.variant == "ip" and progress < self.optimiser.inpainting
 
     @property
     def uses_texture_loss(self) -> bool:
         """Whether the texture is supervised: the warps learn none, and No-Int leaves that out."""
         return self.model.variant in ("full", "ip")
 
-    def learning_rate(self, step: int) -> float:
-        """Compute the learning rate of the update after `step` others."""
-        steps, constant = self.run.steps, self.run.steps * self.optimiser.decay_from
-        left = min(1.0, (steps - step) / (steps - constant)) if constant < steps else 1.0
+    def learning_rate(self, progress: float) -> float:
+        """Compute the learning rate of the update before which that share of the run is done."""
+        falling = 1 - self.optimiser.decay_from
+        left = min(1.0, (1 - progress) / falling) if falling else 1.0
         return self.optimiser.learning_rate * left
 
 

@@ -38,15 +38,18 @@ class Logged:
     """Some steps are done.
 
     Attributes:
+        steps: In all; None where the clock ends the run.
         terms: The losses of the last step, not weighted; `total` is their weighted sum.
         wait_share: The share of the time since the last such event that was spent waiting for data.
+        progress: The share of the run that is done.
     """
 
     step: int
-    steps: int
+    steps: int | None
     terms: Mapping[str, float]
     samples_per_second: float
     wait_share: float
+    progress: float = 0.0
 
 
 Event = Logged | Notice
@@ -58,12 +61,14 @@ class TrainResult:
     """How a run ended.
 
     Attributes:
-        stopped: Whether it was asked to stop, before its last step.
+        stopped: Whether it was asked to stop, before its end.
+        progress: The share of the run that is done.
         weights: The exported file.
     """
 
     step: int
     stopped: bool
+    progress: float
     weights: Path
     samples_per_second: float
     wait_share: float

@@ -18,11 +18,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import torch
+
 from motion_transfer.errors import InputError, OutputError, WeightsError
 from motion_transfer.extras import require_extra
 from motion_transfer.media.growing import write_whole
 from motion_transfer.media.publish import explain_disk_errors
-from motion_transfer.training.config import TrainConfig, build_config, read_settings, write_toml
+from motion_transfer.training.config import (
+    GPU_RECIPE,
+    PEOPLE,
+    TrainConfig,
+    build_config,
+    read_settings,
+    write_toml,
+)
 from motion_transfer.training.pairs import Done, ignore_done
 from motion_transfer.training.progress import Listener
 from motion_transfer.training.sources import open_training_data
@@ -36,7 +45,7 @@ if TYPE_CHECKING:  # it needs the `train` extra
     from motion_transfer.training.trainer import Trainer
 
 CONFIG_FILE = "train.toml"
-MAY_CHANGE = ("run.steps", "run.licence", "data.people_cache", "speed.", "keeping.")
+MAY_CHANGE = ("run.steps", "run.minutes", "run.licence", "data.people_cache", "speed.", "keeping.")
 """What a run that goes on may have otherwise than it began."""
 
 
@@ -62,6 +71,8 @@ def plan_new_run(folder: Path, settings: Mapping[str, Any]) -> PlannedRun:
             " another name"
         )
     init = _load_init(str(settings["run.init"])) if settings.get("run.init") else None
+    if settings.get("data.source", PEOPLE) == PEOPLE and torch.cuda.is_available():
+        settings = {**GPU_RECIPE, **settings}
     return PlannedRun(folder, build_config(settings, model=init and init.config), init)
 
 

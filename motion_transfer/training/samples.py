@@ -1,7 +1,7 @@
 """From pairs of pictures to batches of what the networks take, as rendering would prepare it.
 
 The batches of a run follow from its seed and a step's number alone. Other processes read them while
-the networks work.
+the networks work. Ever new people come by another way, `motion_transfer.training.pool`.
 """
 
 from __future__ import annotations
@@ -9,13 +9,14 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
@@ -28,7 +29,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.publish import name_beside
 from motion_transfer.option import parse_colour
-from motion_transfer.training.config import TrainConfig
+from motion_transfer.training.config import DataSettings, SpeedSettings, TrainConfig
 from motion_transfer.training.pairs import Pair, Pairs, flat_stem
 from motion_transfer.training.pictures import Image, PersonPicture, Picture, Plane, lay_over
 from nhrr_core import shrink_texture
@@ -50,8 +51,7 @@ ORIGIN = re.compile(r"motion_transfer\.errors\.\w+: ")
 class TrainingSamples(Dataset[dict[str, Tensor]]):
     """Samples by their number in the run, which alone decides pair and crop.
 
-    Every epoch has an order of its own. An endless set of pairs is taken in its own order. There
-    are no flips: left and right are different charts.
+    Every epoch has an order of its own. There are no flips: left and right are different charts.
 
     Args:
         textures: The folder that keeps unfolded textures; None: unfold each time.
@@ -92,31 +92,18 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             shrink: Divides the sides of textures and images.
         """
         model, data = self._config.model, self._config.data
-        size = model.image_size // shrink
-        colour = parse_colour(data.background)
         target = pair.target.load()
-        window = person_window(target)
-        least, most = TRAINED_UNSCALED
-        unscaled = least * size <= window.side <= most * size
-        if random is not None:
-            window = _jitter(window, data.jitter, random)
-        if unscaled:  # as in rendering; jitter then only moves the window
-            more = size - window.side
-            window = Window(window.x - more // 2, window.y - more // 2, size)
-        rgb = target.rgb
-        if target.alpha is not None and colour is not None:
-            rgb = lay_over(rgb, target.alpha, colour)
-        rgb = cut_picture(window, rgb, size, colour or BEYOND_THE_PHOTO)
-        sample = {"target_image": to_tensor(rgb), "target_iuv": _chw(window.cut(target.iuv, size))}
+        crop = cut_target(target, model.image_size // shrink, data, random)
+        sample = {"target_image": to_tensor(crop.rgb), "target_iuv": _chw(crop.iuv)}
         if model.alpha:
-            if target.alpha is None:
+            if crop.alpha is None:
                 raise InputError(
                     f"{target.name} has no alpha, which a model with alpha learns from; give it"
                     " STEM_alpha.png, or train without: --set model.alpha=false"
                 )
-            sample["target_alpha"] = to_tensor(cut_picture(window, target.alpha, size, 0))
-            if colour is not None:
-                sample["target_background"] = torch.tensor(colour) / 127.5 - 1
+            sample["target_alpha"] = to_tensor(crop.alpha)
+            if (colour := background_colour(data)) is not None:
+                sample["target_background"] = colour
         source = pair.source.load() if model.clearance else None
         sample |= self._texture("source", pair.source, shrink, source)
         if source:
@@ -131,8 +118,6 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         return sample
 
     def _index(self, number: int) -> int:
-        if self._pairs.endless:
-            return number
         epoch, place = divmod(number, len(self._pairs))
         if self._order is None or self._order[0] != epoch:
             random = np.random.default_rng((self._config.run.seed, 0, epoch))
@@ -171,6 +156,43 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         return rgb, seen
 
 
+@dataclass(frozen=True)
+class Crop:
+    """A target as the networks draw it, S x S, 0..255; its colours lie over the background."""
+
+    rgb: Image
+    iuv: Image
+    alpha: Plane | None
+
+
+def cut_target(
+    picture: PersonPicture, size: int, data: DataSettings, random: np.random.Generator | None
+) -> Crop:
+    """Cut a target out of its picture, with jitter if there is a random generator."""
+    colour = parse_colour(data.background)
+    window = person_window(picture)
+    least, most = TRAINED_UNSCALED
+    unscaled = least * size <= window.side <= most * size
+    if random is not None:
+        window = _jitter(window, data.jitter, random)
+    if unscaled:  # as in rendering; jitter then only moves the window
+        more = size - window.side
+        window = Window(window.x - more // 2, window.y - more // 2, size)
+    rgb, alpha = picture.rgb, picture.alpha
+    if alpha is not None:
+        if colour is not None:
+            rgb = lay_over(rgb, alpha, colour)
+        alpha = cut_picture(window, alpha, size, 0)
+    rgb = cut_picture(window, rgb, size, colour or BEYOND_THE_PHOTO)
+    return Crop(rgb, window.cut(picture.iuv, size), alpha)
+
+
+def background_colour(data: DataSettings) -> Float[Tensor, " 3"] | None:
+    """The colour behind targets whose alpha is known, in [-1, 1]; None: photos stay as they are."""
+    colour = parse_colour(data.background)
+    return None if colour is None else torch.tensor(colour) / 127.5 - 1
+
+
 def person_window(picture: PersonPicture) -> Window:
     """Plan the square that the renderer would cut around the person."""
     return plan_window([bounding_box(picture.iuv)])
@@ -193,6 +215,19 @@ def cut_picture(
     # for colours and alpha; IUV cannot be averaged, `Window.cut` is for that
     kind = cv2.INTER_AREA if size < window.side else cv2.INTER_CUBIC
     return cv2.resize(square, (size, size), interpolation=kind)
+
+
+def halve(batch: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Halve the sides of a batch's textures and images, which saves three quarters of the work."""
+    halved = dict(batch)
+    for role in ("source", "target"):
+        names = f"{role}_texture", f"{role}_visibility"
+        if names[0] in batch:
+            halved |= zip(names, shrink_texture(*(batch[name] for name in names), 2), strict=True)
+    for name in {"target_image", "target_alpha"} & batch.keys():
+        halved[name] = F.avg_pool2d(batch[name], 2)
+    halved["target_iuv"] = batch["target_iuv"][..., 1::2, 1::2]  # as `Window.cut` chooses
+    return halved
 
 
 def to_tensor(image: UInt8[np.ndarray, "*shape"]) -> Float[Tensor, "C H W"]:
@@ -224,6 +259,19 @@ def number_batches(
         yield list(range(first, first + batch_size))
 
 
+def count_workers(speed: SpeedSettings, *, beside_gpu: bool = False) -> int:
+    """Count the processes that make data.
+
+    Args:
+        beside_gpu: Whether they may have all the cores but one by default: a GPU learns faster than
+            any number of them paints.
+    """
+    if speed.workers >= 0:
+        return speed.workers
+    cores = len(os.sched_getaffinity(0))
+    return max(1, cores - 1) if beside_gpu else min(MOST_WORKERS, max(1, cores // 2))
+
+
 def load_batches(
     samples: TrainingSamples,
     config: TrainConfig,
@@ -246,9 +294,7 @@ def load_batches(
         process=process,
         processes=processes,
     )
-    workers = config.speed.workers
-    if workers < 0:
-        workers = min(MOST_WORKERS, max(1, len(os.sched_getaffinity(0)) // 2))
+    workers = count_workers(config.speed)
     loader = DataLoader(
         samples,
         batch_sampler=batches,

@@ -5,7 +5,7 @@ Tensors in, numbers out: no files but the judges' own, no devices chosen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +17,21 @@ from torch import Tensor, nn
 from torch.optim import Optimizer
 
 from motion_transfer.errors import WeightsError
+from motion_transfer.estimate.models import FACE_NETWORK, find_model
 from motion_transfer.training.config import LossSettings
+from motion_transfer.training.face_networks import (
+    CHIP_SIZE,
+    DlibFace,
+    frame_chips,
+    load_dlib_face,
+)
 from motion_transfer.training.faces import (
     REMEDY,
     WHAT,
     FaceIdentity,
     crop_boxes,
+    face_table,
+    find_faces,
     find_heads,
     load_sphereface,
 )
@@ -34,20 +43,52 @@ from motion_transfer.training.feature_networks import (
 from nhrr_core import (
     LossWeights,
     NeuralReRenderer,
+    Verdict,
     adversarial_loss,
     alpha_loss,
     discriminator_loss,
+    face_identity_loss,
     generator_loss,
+    matching_loss,
     perceptual_loss,
+    r1_penalty,
     texture_loss,
 )
 from nhrr_core.config import COLOUR_CHANNELS
+
+R1_EVERY = 16
+"""Steps of which one has the R1 penalty, as many times as large; from StyleGAN2 (CVPR 2020)."""
 
 HEAD_SIZE = 96
 """Px to which a head is enlarged before it is judged."""
 
 Batch = Mapping[str, Tensor]
 Terms = dict[str, Tensor]
+
+
+class DlibIdentity(nn.Module):
+    """The face identity loss by dlib's network, in place of SphereFace's: its weights are free."""
+
+    table: Tensor
+
+    def __init__(self, network: DlibFace) -> None:
+        super().__init__()
+        self.network = network
+        self.register_buffer("table", face_table(), persistent=False)
+
+    def forward(
+        self,
+        generated: Float[Tensor, "B 3 H W"],
+        truth: Float[Tensor, "B 3 H W"],
+        iuv: UInt8[Tensor, "B 3 H W"],
+    ) -> Float[Tensor, ""]:
+        """Compute the loss of generated images, RGB in [-1, 1], whose truth shares their IUV."""
+        faces, seen = find_faces(iuv, self.table)
+        boxes, size = frame_chips(faces), (CHIP_SIZE, CHIP_SIZE)
+        with torch.no_grad():
+            wanted = self.network(crop_boxes(truth, boxes, size))
+        found = self.network(crop_boxes(generated, boxes, size))
+        return face_identity_loss(found, wanted, seen)
 
 
 class Generator(nn.Module):
@@ -93,7 +134,7 @@ class Judges:
     """The frozen networks; None where the loss is left out."""
 
     perceptual: FeatureNetwork | None = None
-    identity: FaceIdentity | None = None
+    identity: FaceIdentity | DlibIdentity | None = None
 
     def to(self, device: torch.device) -> Judges:
         """Move them to a device."""
@@ -118,6 +159,8 @@ def load_judges(settings: LossSettings) -> Judges:
         if not settings.sphereface_file:
             raise WeightsError(f"{WHAT} are not given; {REMEDY}")
         identity = FaceIdentity(load_sphereface(Path(settings.sphereface_file)))
+    elif settings.identity == "dlib":
+        identity = DlibIdentity(load_dlib_face(find_model(FACE_NETWORK)))
     return Judges(perceptual, identity)
 
 
@@ -141,13 +184,15 @@ def generator_terms(
     discriminator: nn.Module | None,
     *,
     heads: bool = False,
+    matching: bool = False,
 ) -> Terms:
     """Compute the terms of L_G that this batch and these judges give, not yet weighted.
 
     Args:
         heads: Whether the perceptual term is also taken of the heads alone, enlarged: at the size
             of a whole person a face is 30 px wide, and most layers see nothing of it.
-    Source: the paper, Sec. 3.5. Departs from it: `heads`.
+        matching: Whether the discriminator's features are to be those of the real images.
+    Source: the paper, Sec. 3.5. Departs from it: `heads`, `matching`.
     """
     terms: Terms = {}
     if "target_texture" in batch:
@@ -170,8 +215,13 @@ def generator_terms(
         terms["alpha"] = alpha_loss(image[:, COLOUR_CHANNELS:], batch["target_alpha"])
     if discriminator is not None:
         # detached: the feature image must be no way to please the discriminator
-        logits = discriminator(image, drawn.feature_image.detach())
-        terms["adversarial"] = adversarial_loss([scale.float() for scale in logits])
+        condition = drawn.feature_image.detach()
+        verdicts = discriminator(image, condition)
+        terms["adversarial"] = adversarial_loss(_logits(verdicts))
+        if matching:
+            with torch.no_grad():
+                wanted = discriminator(_real_image(batch), condition)
+            terms["matching"] = matching_loss(_features(verdicts), _features(wanted))
     return terms
 
 
@@ -198,12 +248,33 @@ def discriminator_term(batch: Batch, drawn: Drawn, discriminator: nn.Module) -> 
     """Compute L_D of a batch; nothing of it reaches the generator."""
     assert drawn.feature_image is not None
     condition = drawn.feature_image.detach()
-    real = [batch[name] for name in ("target_image", "target_alpha") if name in batch]
     # one pass over both: its instance norm looks at each image alone
-    pairs = torch.cat([torch.cat(real, dim=1), shown_image(batch, drawn).detach()])
-    logits = [scale.float() for scale in discriminator(pairs, condition.repeat(2, 1, 1, 1))]
-    halves = [scale.chunk(2) for scale in logits]
+    pairs = torch.cat([_real_image(batch), shown_image(batch, drawn).detach()])
+    halves = [
+        scale.chunk(2) for scale in _logits(discriminator(pairs, condition.repeat(2, 1, 1, 1)))
+    ]
     return discriminator_loss([real for real, _ in halves], [fake for _, fake in halves])
+
+
+def r1_term(batch: Batch, drawn: Drawn, discriminator: nn.Module) -> Tensor:
+    """Compute the R1 penalty of a batch; nothing of it reaches the generator."""
+    assert drawn.feature_image is not None
+    real = _real_image(batch).requires_grad_()
+    return r1_penalty(_logits(discriminator(real, drawn.feature_image.detach())), real)
+
+
+def _real_image(batch: Batch) -> Tensor:
+    """The target as RenderNet would draw it, with alpha where it draws that."""
+    real = [batch[name] for name in ("target_image", "target_alpha") if name in batch]
+    return torch.cat(real, dim=1)
+
+
+def _logits(verdicts: Sequence[Verdict]) -> list[Tensor]:
+    return [verdict.logits.float() for verdict in verdicts]
+
+
+def _features(verdicts: Sequence[Verdict]) -> list[list[Tensor]]:
+    return [[layer.float() for layer in verdict.features] for verdict in verdicts]
 
 
 @dataclass(frozen=True)
@@ -249,13 +320,15 @@ def update(
     *,
     adversarial: bool,
     inpainting: bool = False,
+    r1_weight: float = 0.0,
 ) -> Terms:
     """Make one step of the generator, then one of the discriminator against what was drawn.
 
     Args:
         adversarial: Whether the discriminator takes part yet.
         inpainting: Whether only the feature map is drawn and trained.
-    Returns: The terms, not weighted, detached; `total`; and `discriminator`.
+        r1_weight: Of the R1 penalty of this step; 0: none.
+    Returns: The terms, not weighted, detached; `total`; `discriminator`; and `r1`, if there is one.
     """
     discriminator = players.discriminator if adversarial and not inpainting else None
     if discriminator is not None:
@@ -269,15 +342,20 @@ def update(
             batch.get("source_clearance"),
         )
         judge = discriminator and arithmetic.without_hooks(discriminator)
-        terms = generator_terms(batch, drawn, judges, judge, heads=weights.head > 0)
+        terms = generator_terms(
+            batch, drawn, judges, judge, heads=weights.head > 0, matching=weights.matching > 0
+        )
         total = generator_loss(terms, weights)
     _learn(total, players.generator_optimiser, arithmetic)
     terms["total"] = total
     if discriminator is not None and players.discriminator_optimiser is not None:
         discriminator.requires_grad_(True)
         with arithmetic.autocast():
-            terms["discriminator"] = discriminator_term(batch, drawn, discriminator)
-        _learn(terms["discriminator"], players.discriminator_optimiser, arithmetic)
+            loss = terms["discriminator"] = discriminator_term(batch, drawn, discriminator)
+            if r1_weight:
+                terms["r1"] = r1_term(batch, drawn, discriminator)
+                loss = loss + r1_weight * terms["r1"]
+        _learn(loss, players.discriminator_optimiser, arithmetic)
     return {name: term.detach() for name, term in terms.items()}
 
 

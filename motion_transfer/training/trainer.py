@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
+import time
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +27,8 @@ from motion_transfer.training.checkpoints import (
     write_state,
 )
 from motion_transfer.training.config import TrainConfig, write_toml
+from motion_transfer.training.painters import Painter, Painters
+from motion_transfer.training.pool import PeoplePool
 from motion_transfer.training.progress import (
     Listener,
     Logged,
@@ -32,10 +37,11 @@ from motion_transfer.training.progress import (
     choose_previews,
     draw_grid,
 )
-from motion_transfer.training.samples import TrainingSamples, load_batches
-from motion_transfer.training.sources import TrainingData
+from motion_transfer.training.samples import TrainingSamples, count_workers, halve, load_batches
+from motion_transfer.training.sources import StreamedPairs, TrainingData
 from motion_transfer.training.speed import Clock, arrange, choose_precision, keep_memory
 from motion_transfer.training.step import (
+    R1_EVERY,
     Arithmetic,
     Average,
     Generator,
@@ -77,6 +83,8 @@ class Trainer:
         keep_memory()
         self._accelerator = make_accelerator(config)
         self._device = self._accelerator.device
+        if self._device.type == "cuda":
+            torch.set_float32_matmul_precision("high")  # TF32, as convolutions have it anyway
         self._listener = listener if self._accelerator.is_main_process else lambda _event: None
         with self._accelerator.main_process_first():
             self._data = open_data()
@@ -84,6 +92,8 @@ class Trainer:
             self._listener(Notice(f"left out: {line}"))
         self._judges = judges.to(self._device)
         arrange(self._judges.perceptual)
+        self.step = max(list_steps(run), default=0)
+        self._painters = self._start_painters()  # who paint while the rest is prepared
         self._state = build_state(config, init, self._device)
         self._average = self._state.average and Average(
             self._state.average, config.optimiser.ema_decay
@@ -95,9 +105,11 @@ class Trainer:
             self._accelerator.backward,
             self._accelerator.unwrap_model,
         )
-        self.step = max(list_steps(run), default=0)
+        # of training, those of earlier pieces of the run included
+        self._began = self._seconds = 0.0
         if self.step:
-            read_state(run, self.step, self._state, data_digest=self._data.digest)
+            digest = self._data.digest
+            self._seconds = read_state(run, self.step, self._state, data_digest=digest)
         self._samples = self._make_samples()
         self._board: SummaryWriter | None = None
         self._previews: list[Preview] = []
@@ -107,12 +119,19 @@ class Trainer:
             )
 
     def train(self, should_stop: Callable[[], bool] = lambda: False) -> TrainResult:
-        """Go on to the last step, or until asked to stop; either way a checkpoint is written.
+        """Go on to the last step or minute, or until asked to stop; a checkpoint is written then.
 
-        Raises: TrainingError if a loss is no number any more.
+        Raises: TrainingError if a loss is no number any more, or people cannot be painted.
         """
-        first, steps, keeping = self.step, self._config.run.steps, self._config.keeping
-        if first > steps:
+        try:
+            return self._train(should_stop)
+        finally:
+            if self._painters is not None:
+                self._painters.close()
+
+    def _train(self, should_stop: Callable[[], bool]) -> TrainResult:
+        first, run, keeping = self.step, self._config.run, self._config.keeping
+        if not run.minutes and first > run.steps:
             raise InputError(f"the run has {first} steps already; give --steps more than that")
         if keeping.tensorboard and self._accelerator.is_main_process:
             from torch.utils.tensorboard import SummaryWriter
@@ -121,20 +140,14 @@ class Trainer:
             purge = first + 1 if first else None
             self._board = SummaryWriter(str(self._run / "tensorboard"), purge_step=purge)
         clock = Clock()
+        self._began = time.monotonic() - self._seconds
         stopped = False
         try:
             if first == 0:
                 self._draw_samples()
-            batches = load_batches(
-                self._samples,
-                self._config,
-                range(first, steps),
-                process=self._accelerator.process_index,
-                processes=self._accelerator.num_processes,
-                pin_memory=self._device.type == "cuda",
-            )
-            for _ in range(first, steps):
-                self._take_step(batches, clock)
+            batches = self._open_batches()
+            while (progress := self._progress()) < 1:
+                self._take_step(batches, clock, progress)
                 stopped = self._agree(should_stop())
                 if stopped:
                     break
@@ -150,11 +163,13 @@ class Trainer:
             with explain_disk_errors(path):
                 save_checkpoint(path, self._best, notes=self._notes())
         self._accelerator.wait_for_everyone()
+        progress = self._progress()
         samples = (self.step - first) * self._samples_a_step
         self._accelerator.end_training()
         return TrainResult(
             step=self.step,
             stopped=stopped,
+            progress=progress,
             weights=path,
             samples_per_second=samples / clock.seconds if clock.seconds else 0.0,
             wait_share=clock.wait_share,
@@ -178,10 +193,51 @@ class Trainer:
         elif self._accelerator.is_main_process:
             textures.mkdir(parents=True, exist_ok=True)
         self._accelerator.wait_for_everyone()
-        half_size = config.half_size_steps * self._samples_a_step
+        half_size = 0 if self._halves_batches else config.half_size_steps * self._samples_a_step
         return TrainingSamples(
             self._data.pairs, config, textures=textures, half_size_samples=half_size
         )
+
+    def _start_painters(self) -> Painters | None:
+        """Have ever new people painted, if that is what the data are."""
+        pairs, accelerator = self._data.pairs, self._accelerator
+        if not isinstance(pairs, StreamedPairs):
+            return None
+        workers = count_workers(self._config.speed, beside_gpu=self._device.type == "cuda")
+        first = self.step * self._samples_a_step  # nobody who was painted for earlier steps
+        return Painters(
+            Painter(pairs, self._config),
+            count(first + accelerator.process_index, accelerator.num_processes),
+            workers=workers and max(1, workers // accelerator.num_processes),
+            note=lambda text: self._listener(Notice(text)),
+        )
+
+    def _open_batches(self) -> Iterator[dict[str, Tensor]]:
+        config, process = self._config, self._accelerator.process_index
+        if self._painters is not None:
+            seed = (config.run.seed, 2, self.step, process)
+            return iter(PeoplePool(config, self._painters, self._device, seed))
+        return load_batches(
+            self._samples,
+            config,
+            range(self.step, sys.maxsize if config.run.minutes else config.run.steps),
+            process=process,
+            processes=self._accelerator.num_processes,
+            pin_memory=self._device.type == "cuda",
+        )
+
+    @property
+    def _halves_batches(self) -> bool:
+        """Whether batches are halved here: samples do not know how far a run by the clock is."""
+        return self._painters is not None or self._config.run.minutes > 0
+
+    def _progress(self) -> float:
+        """The share of the run that is done, the same for all processes."""
+        self._seconds = time.monotonic() - self._began
+        if self._config.run.minutes and self._accelerator.num_processes > 1:
+            seconds = torch.tensor([self._seconds], device=self._device)
+            self._seconds = float(self._accelerator.gather(seconds)[0])  # pyright: ignore
+        return self._config.progress(self.step, self._seconds)
 
     @property
     def _best(self) -> NeuralReRenderer:
@@ -193,19 +249,24 @@ class Trainer:
         optimiser = self._config.optimiser
         return optimiser.batch_size * optimiser.accumulation * self._accelerator.num_processes
 
-    def _take_step(self, batches: Iterator[dict[str, Tensor]], clock: Clock) -> None:
+    def _take_step(
+        self, batches: Iterator[dict[str, Tensor]], clock: Clock, progress: float
+    ) -> None:
         config, keeping = self._config, self._config.keeping
-        inpainting = self.step < config.inpainting_steps
+        inpainting = config.is_inpainting(progress)
+        halves = self._halves_batches and progress < config.optimiser.half_size
+        penalised = (self.step + 1) % R1_EVERY == 0
         set_stage(self._state.model, inpainting=inpainting)
         for optimiser in self._state.optimisers.values():
             for group in optimiser.param_groups:
-                group["lr"] = config.learning_rate(self.step)
+                group["lr"] = config.learning_rate(progress)
         networks = [self._players.generator, self._players.discriminator]
         sums: Terms = {}  # on the device: reading them now would wait for it
         with clock.step():
             for _ in range(config.optimiser.accumulation):
                 with clock.waiting():
                     batch = {k: v.to(self._device) for k, v in next(batches).items()}
+                    batch = halve(batch) if halves else batch
                 with self._accelerator.accumulate(*filter(None, networks)):
                     terms = update(
                         batch,
@@ -213,8 +274,9 @@ class Trainer:
                         self._judges,
                         config.losses.weights,
                         self._arithmetic,
-                        adversarial=self.step >= config.adversarial_start,
+                        adversarial=config.is_adversarial(progress),
                         inpainting=inpainting,
+                        r1_weight=config.losses.r1_weight * R1_EVERY if penalised else 0.0,
                     )
                 for name, term in terms.items():
                     sums[name] = sums.get(name, 0) + term / config.optimiser.accumulation
@@ -222,13 +284,13 @@ class Trainer:
             if self._average is not None:
                 self._average.update(self._state.model, self.step)
         if self.step % keeping.log_every == 0 or self.step == config.run.steps:
-            self._log(sums, clock)
+            self._log(sums, clock, progress)
         if keeping.sample_every and self.step % keeping.sample_every == 0:
             self._draw_samples()
         if keeping.checkpoint_every and self.step % keeping.checkpoint_every == 0:
             self._save()
 
-    def _log(self, terms: Terms, clock: Clock) -> None:
+    def _log(self, terms: Terms, clock: Clock, progress: float) -> None:
         values = {name: float(term) for name, term in terms.items()}
         for name, value in values.items():
             if not math.isfinite(value):
@@ -244,7 +306,9 @@ class Trainer:
             curves = {**values, "samples_per_second": rate, "wait_share": wait_share}
             for name, value in curves.items():
                 self._board.add_scalar(name, value, self.step)
-        self._listener(Logged(self.step, self._config.run.steps, values, rate, wait_share))
+        run = self._config.run
+        steps = None if run.minutes else run.steps
+        self._listener(Logged(self.step, steps, values, rate, wait_share, progress))
 
     def _draw_samples(self) -> None:
         if not self._previews:
@@ -260,7 +324,14 @@ class Trainer:
     def _save(self) -> None:
         if self._accelerator.is_main_process:
             digest, notes = self._data.digest, self._notes()
-            write_state(self._run, self.step, self._state, data_digest=digest, notes=notes)
+            write_state(
+                self._run,
+                self.step,
+                self._state,
+                seconds=self._seconds,
+                data_digest=digest,
+                notes=notes,
+            )
             tidy(self._run, self._config.keeping)
         self._accelerator.wait_for_everyone()
 
@@ -323,7 +394,8 @@ def build_state(
         average.load_state_dict(model.state_dict())
     if config.speed.compile:
         for network in (model.feature_net, model.render_net, discriminator):
-            if network is not None:
+            # what is compiled has no gradient of a gradient, as R1 needs
+            if network is not None and not (network is discriminator and config.losses.r1_weight):
                 network.compile(dynamic=False)  # there are two image sizes at most
     adam: dict[str, Any] = {
         "lr": config.optimiser.learning_rate,

@@ -74,9 +74,21 @@ def test_logits_a_scale_at_256_px() -> None:
     """Down: n -> n / 2 + 1, three times; then two convolutions that each add a pixel."""
     with torch.device("meta"):
         network = Discriminator(image_channels=4, condition_channels=16)
-        logits = network(torch.empty(2, 4, 256, 192), torch.empty(2, 16, 256, 192))
+        verdicts = network(torch.empty(2, 4, 256, 192), torch.empty(2, 16, 256, 192))
     sizes = [(2, 1, 35, 27), (2, 1, 19, 15), (2, 1, 11, 9)]
-    assert [tuple(scale.shape) for scale in logits] == sizes
+    assert [tuple(verdict.logits.shape) for verdict in verdicts] == sizes
+
+
+def test_features_are_the_four_layers_before_the_logits() -> None:
+    scale = PatchDiscriminator(inputs=5, width=4)
+    logits, features = scale(torch.rand(2, 5, 32, 32))
+    assert [tuple(layer.shape) for layer in features] == [
+        (2, 4, 17, 17),
+        (2, 8, 9, 9),
+        (2, 16, 5, 5),
+        (2, 32, 6, 6),
+    ]
+    assert torch.equal(scale.layers[-1](features[-1]), logits)
 
 
 def test_a_logit_sees_70_pixels() -> None:
@@ -96,8 +108,8 @@ def test_each_scale_sees_half_of_the_one_before(size: tuple[int, int]) -> None:
     network = small()
     image, condition = torch.rand(2, 3, *size), torch.rand(2, 2, *size)
     pair = torch.cat([image, condition], 1)
-    for scale, logits in zip(network.scales, network(image, condition), strict=True):
-        torch.testing.assert_close(logits, scale(pair), rtol=1e-4, atol=1e-5)
+    for scale, verdict in zip(network.scales, network(image, condition), strict=True):
+        torch.testing.assert_close(verdict.logits, scale(pair).logits, rtol=1e-4, atol=1e-5)
         pair = halved(pair)
 
 
@@ -114,7 +126,7 @@ def test_logits_are_not_squashed() -> None:
     for name, parameter in network.named_parameters():
         if name.endswith("layers.11.bias"):  # of the last convolution
             nn.init.constant_(parameter, -7.5)
-    for logits in network(torch.rand(1, 3, 32, 32), torch.rand(1, 2, 32, 32)):
+    for logits, _ in network(torch.rand(1, 3, 32, 32), torch.rand(1, 2, 32, 32)):
         assert (logits == -7.5).all()
 
 
@@ -122,7 +134,7 @@ def test_gradient_reaches_every_weight_image_and_condition() -> None:
     network = small()
     image = torch.rand(1, 3, 40, 40, requires_grad=True)
     condition = torch.rand(1, 2, 40, 40, requires_grad=True)
-    total = sum((logits * torch.rand_like(logits)).sum() for logits in network(image, condition))
+    total = sum((logits * torch.rand_like(logits)).sum() for logits, _ in network(image, condition))
     assert isinstance(total, Tensor)
     total.backward()
     for tensor in (image, condition):
@@ -142,14 +154,15 @@ def test_it_learns_which_image_belongs_to_a_condition() -> None:
     for _ in range(60):
         right, wrong = network(image, image), network(image, other)
         loss = sum(
-            F.softplus(-r).mean() + F.softplus(w).mean() for r, w in zip(right, wrong, strict=True)
+            F.softplus(-r.logits).mean() + F.softplus(w.logits).mean()
+            for r, w in zip(right, wrong, strict=True)
         )
         optimiser.zero_grad()
         assert isinstance(loss, Tensor)
         loss.backward()
         optimiser.step()
     for r, w in zip(network(image, image), network(image, other), strict=True):
-        assert r.mean() > w.mean() + 1
+        assert r.logits.mean() > w.logits.mean() + 1
 
 
 @pytest.mark.usefixtures("unchecked")

@@ -23,7 +23,9 @@ from nhrr_core import (
     discriminator_loss,
     face_identity_loss,
     generator_loss,
+    matching_loss,
     perceptual_loss,
+    r1_penalty,
     texture_loss,
 )
 
@@ -213,8 +215,38 @@ def test_alpha_loss() -> None:
     assert alpha_loss(alpha, coverage).item() == (0 + 2 + 0.5 + 0.5) / 4
 
 
+def test_matching_loss_is_a_mean_over_scales_and_a_sum_over_layers() -> None:
+    ones, zeros = torch.ones(2, 3, 4, 4), torch.zeros(2, 3, 4, 4)
+    generated = [[ones, 3 * ones], [ones, ones]]
+    truth = [[zeros, ones], [-ones, ones]]
+    assert matching_loss(generated, truth).item() == ((1 + 2) + (2 + 0)) / 2
+
+
+def test_r1_of_a_linear_discriminator_is_half_the_squared_length_of_its_weights() -> None:
+    """Two scales that see everything: the gradient of the sum of logits is the sum of weights."""
+    weights = [torch.randn(1, 3, 4, 4, dtype=torch.float64, requires_grad=True) for _ in range(2)]
+    image = noise(5, 3, 4, 4)
+    logits = [torch.nn.functional.conv2d(image, weight) for weight in weights]
+    penalty = r1_penalty(logits, image)
+    total = (weights[0] + weights[1]).detach()
+    torch.testing.assert_close(penalty, total.square().sum() / 2, rtol=1e-6, atol=0)
+    penalty.backward()
+    for weight in weights:
+        assert weight.grad is not None
+        torch.testing.assert_close(weight.grad, total, rtol=1e-6, atol=0)
+
+
+def test_r1_sums_over_patches_and_is_a_mean_over_images() -> None:
+    """One weight w, seen by each of 9 pixels' own patch, on images that differ."""
+    image = noise(2, 1, 3, 3)
+    logits = image**2 / 2  # the gradient is the image
+    wanted = image.square().sum((1, 2, 3)).mean() / 2
+    torch.testing.assert_close(r1_penalty([logits], image), wanted, rtol=1e-6, atol=0)
+
+
 def test_weights_are_the_paper_s() -> None:
     weights = LossWeights()
+    assert weights.matching == weights.head == 0
     assert (weights.perceptual, weights.adversarial) == (10, 1)
     assert (weights.identity, weights.texture) == (5, 1)
 
@@ -256,6 +288,9 @@ def test_terms_without_weights_raise(terms: dict[str, Tensor], message: str) -> 
         lambda: discriminator_loss(scales(), scales()[:2]),
         lambda: discriminator_loss([], []),
         lambda: adversarial_loss([]),
+        lambda: matching_loss([], []),
+        lambda: matching_loss([layers()], [layers()[:2]]),
+        lambda: r1_penalty([], noise(1, 1, 1, 1)),
         lambda: perceptual_loss(layers(), layers()[:2], [1.0, 1.0, 1.0]),
         lambda: perceptual_loss(layers(), layers(), [1.0, 1.0]),
         lambda: perceptual_loss([], [], []),

@@ -32,6 +32,7 @@ def test_the_defaults_are_the_papers() -> None:
     )
     assert (config.optimiser.learning_rate, config.optimiser.beta1) == (2e-4, 0.5)
     assert config.losses.discriminator_scales == 3
+    assert config.losses.matching_weight == config.losses.r1_weight == 0
     assert config.losses.identity == "sphereface"
     assert config.losses.adversarial
     assert config.model == ModelConfig.preset("lite")
@@ -136,27 +137,39 @@ def test_weights_to_start_from_decide_the_shape() -> None:
 
 def test_the_stages_of_a_run() -> None:
     by_the_paper = build_config({"data.source": "pairs.csv", "run.steps": 200})
-    assert (by_the_paper.half_size_steps, by_the_paper.adversarial_start) == (0, 0)
+    assert by_the_paper.half_size_steps == 0
+    assert by_the_paper.is_adversarial(0)
     on_people = build_config({"run.steps": 200})
-    assert (on_people.half_size_steps, on_people.adversarial_start) == (140, 170)
+    assert on_people.half_size_steps == 140
+    judged = [on_people.is_adversarial(on_people.progress(step, 0)) for step in (0, 169, 170)]
+    assert judged == [False, False, True]
     small = {"model.image_size": 24, "model.texture_size": 32}
     with pytest.raises(InputError, match=r"half of model\.image_size, 24, is no multiple of 8"):
         build_config(small)
     assert build_config({**small, "optimiser.half_size": 0}).half_size_steps == 0
 
 
+def test_steps_or_the_clock_tell_how_far_a_run_is() -> None:
+    by_steps = build_config({"run.steps": 8})
+    assert [by_steps.progress(step, 1e9) for step in (0, 2, 8, 9)] == [0, 0.25, 1, 1]
+    by_the_clock = build_config({"run.steps": 8, "run.minutes": 0.5})
+    assert [by_the_clock.progress(99, seconds) for seconds in (0, 15, 30, 31)] == [0, 0.5, 1, 1]
+
+
 def test_the_learning_rate_stays_then_falls_to_nothing() -> None:
-    constant = build_config({"run.steps": 8, "optimiser.learning_rate": 0.1})
-    assert {constant.learning_rate(step) for step in range(8)} == {0.1}
-    falling = {"run.steps": 8, "optimiser.learning_rate": 0.1, "optimiser.decay_from": 0.5}
-    rates = [build_config(falling).learning_rate(step) for step in range(9)]
+    constant = build_config({"optimiser.learning_rate": 0.1})
+    eighths = [number / 8 for number in range(9)]
+    assert {constant.learning_rate(progress) for progress in eighths} == {0.1}
+    falling = {"optimiser.learning_rate": 0.1, "optimiser.decay_from": 0.5}
+    rates = [build_config(falling).learning_rate(progress) for progress in eighths]
     assert rates == pytest.approx([0.1] * 5 + [0.075, 0.05, 0.025, 0])
     whole = build_config({**falling, "optimiser.decay_from": 0})
-    assert whole.learning_rate(4) == pytest.approx(0.05)
+    assert whole.learning_rate(0.5) == pytest.approx(0.05)
 
 
 def test_the_stages_of_ip() -> None:
-    assert TrainConfig().inpainting_steps == 0
-    assert build_config({"model.variant": "ip", "run.steps": 10}).inpainting_steps == 5
-    chosen = {"model.variant": "ip", "run.steps": 10, "optimiser.inpainting": 0.3}
-    assert build_config(chosen).inpainting_steps == 3
+    assert not TrainConfig().is_inpainting(0)
+    ip = build_config({"model.variant": "ip"})
+    assert (ip.is_inpainting(0.49), ip.is_inpainting(0.5)) == (True, False)
+    chosen = build_config({"model.variant": "ip", "optimiser.inpainting": 0.3})
+    assert not chosen.is_inpainting(0.3)

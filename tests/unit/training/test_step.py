@@ -12,11 +12,13 @@ from torch import Tensor, nn
 
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.training.config import LossSettings
-from motion_transfer.training.faces import FaceIdentity, SphereFace20
+from motion_transfer.training.face_networks import DlibFace
+from motion_transfer.training.faces import FaceIdentity, SphereFace20, face_table
 from motion_transfer.training.feature_networks import FeatureNetwork
 from motion_transfer.training.step import (
     Arithmetic,
     Average,
+    DlibIdentity,
     Drawn,
     Generator,
     Judges,
@@ -81,10 +83,12 @@ class Game:
         if alpha:
             self.batch["target_alpha"] = torch.rand(2, 1, 32, 32) * 2 - 1
 
-    def update(self, judges: Judges | None = None, **how) -> dict[str, Tensor]:
+    def update(
+        self, judges: Judges | None = None, players: Players | None = None, **how
+    ) -> dict[str, Tensor]:
         judges = Judges(Pixels()) if judges is None else judges
         how = {"adversarial": True, **how}
-        return update(self.batch, self.players, judges, LossWeights(), PLAIN, **how)
+        return update(self.batch, players or self.players, judges, LossWeights(), PLAIN, **how)
 
     def changed(self, before: dict[str, Tensor], network: nn.Module) -> set[str]:
         """Top-level parts of a network whose tensors differ from before."""
@@ -159,6 +163,40 @@ def test_the_total_is_weighted() -> None:
     assert terms["total"] == pytest.approx(float(weighted), rel=1e-5)
 
 
+def test_feature_matching_pulls_the_generator_towards_what_is_real() -> None:
+    game = Game(alpha=True)
+    weights = LossWeights(adversarial=0.0, texture=0.0, alpha=0.0, matching=1.0)
+    learner = game.players.generator_optimiser
+    players = Players(game.players.generator, learner, game.discriminator, Still())
+    found = [
+        float(update(game.batch, players, Judges(), weights, PLAIN, adversarial=True)["matching"])
+        for _ in range(30)
+    ]
+    assert found[-1] < 0.8 * found[0]
+    assert "matching" not in game.update()
+
+
+def test_the_r1_penalty_holds_the_discriminator_back() -> None:
+    def train(r1_weight: float) -> tuple[float, dict[str, Tensor]]:
+        game = Game()
+        rest = Players(
+            game.players.generator,
+            Still(),
+            game.discriminator,
+            game.players.discriminator_optimiser,
+        )
+        for _ in range(20):
+            game.model.zero_grad()
+            terms = game.update(players=rest, r1_weight=r1_weight)
+        terms = game.update(players=rest, r1_weight=1e-9)
+        return float(terms["r1"]), copy(game.model)
+
+    (free, model), (held, other) = train(0), train(10)
+    assert held < 0.1 * free
+    assert all(torch.equal(model[name], other[name]) for name in model), "the generator rests"
+    assert "r1" not in Game().update()
+
+
 def test_before_its_start_the_discriminator_rests() -> None:
     game = Game()
     before = copy(game.discriminator)
@@ -187,6 +225,17 @@ def test_the_generator_hears_the_discriminator() -> None:
         *("adversarial", "discriminator", "total"),
     }
     assert game.changed(before, game.model) == {"render_net"}
+
+
+@pytest.fixture
+def face_iuv() -> Tensor:
+    """A head seen from the front in the middle of 96 x 96 px, of the places of a face."""
+    part, v, u = face_table().nonzero().unbind(1)
+    chosen = torch.arange(24 * 24) * (len(part) // (24 * 24))
+    iuv = torch.zeros(1, 3, 96, 96, dtype=torch.uint8)
+    for channel, values in enumerate((part, u, v)):
+        iuv[0, channel, 36:60, 36:60] = values[chosen].view(24, 24).to(torch.uint8)
+    return iuv
 
 
 class Still:
@@ -229,6 +278,7 @@ def test_the_average_follows() -> None:
     ("settings", "remedies"),
     [
         ({"identity": "sphereface"}, ("--sphereface FILE", "--no-identity")),
+        ({"identity": "dlib"}, ("mt models fetch --faces",)),
         (
             {"identity": "sphereface", "sphereface_file": "/nowhere.pth"},
             ("--sphereface FILE", "--no-identity"),
@@ -241,11 +291,25 @@ def test_a_missing_network_is_an_error_with_its_way_out(
     settings: dict, remedies: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
+    monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path))
     given = {"perceptual": "none", "identity": "none", **settings}
     with pytest.raises((WeightsError, InputError)) as caught:
         load_judges(LossSettings(**given))
     for remedy in remedies:
         assert remedy in str(caught.value)
+
+
+def test_identity_by_dlib_looks_at_the_face_alone(face_iuv: Tensor) -> None:
+    judge = DlibIdentity(DlibFace())
+    truth = torch.rand(1, 3, 96, 96) * 2 - 1
+    drawn = truth.clone().requires_grad_()
+    assert judge(drawn, truth, face_iuv) == 0
+    other = (truth + 0.1 * torch.randn_like(truth)).requires_grad_()
+    judge(other, truth, face_iuv).backward()
+    assert other.grad is not None
+    rows = other.grad.abs().sum((0, 1, 3)).nonzero().flatten()
+    assert 0 < len(rows) < 96
+    assert judge(torch.zeros_like(truth), truth, torch.zeros_like(face_iuv)) == 0
 
 
 def test_left_out_losses_have_no_judge() -> None:

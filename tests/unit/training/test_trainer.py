@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 import torch
@@ -76,7 +77,8 @@ def flatten(value: Any, name: str) -> dict[str, Any]:
 
 def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
     assert one.keys() == other.keys()
-    for name, value in one.items():
+    for name in one.keys() - {"state/seconds"}:
+        value = one[name]
         equal = torch.equal(value, other[name]) if torch.is_tensor(value) else value == other[name]
         assert equal, name
 
@@ -128,6 +130,49 @@ def test_the_learning_rate_falls_as_the_settings_say(run: Run) -> None:
     run.train(**{"keeping.checkpoint_every": 1, "keeping.keep_last": 4})
     rates = [run.checkpoint(step)["optimisers/generator/param_groups/0/lr"] for step in (1, 3, 4)]
     assert rates == pytest.approx([0.01, 0.01, 0.005]), "of the update that led there"
+
+
+class Seconds:
+    """A clock that goes on by a second whenever somebody looks at it."""
+
+    now = 1000.0
+
+    def __call__(self) -> float:
+        self.now += 1
+        return self.now
+
+
+def test_the_clock_ends_a_run_and_goes_on_where_it_was(run: Run, monkeypatch) -> None:
+    """Six seconds; each step takes one, and so does the beginning of each piece."""
+    monkeypatch.setattr("motion_transfer.training.trainer.time", Mock(monotonic=Seconds()))
+    stages = {"optimiser.half_size": 0.5, "losses.adversarial_from": 0.6, "run.steps": 2}
+    stages |= {"optimiser.learning_rate": 0.01, "optimiser.decay_from": 0.5, "run.minutes": 0.1}
+    result = run.train(stop_at=3, **stages)
+    assert (result.stopped, result.progress) == (True, pytest.approx(4 / 6))
+    assert run.checkpoint(3)["state/seconds"] == 3
+    result = run.train()
+    assert (result.stopped, result.progress, result.step) == (False, 1, 5)
+    assert [event.steps for event in run.logged] == [None] * 5
+    progress = [event.progress * 6 for event in run.logged]
+    assert progress == pytest.approx([1, 2, 3, 4, 5])
+    assert ["adversarial" in event.terms for event in run.logged] == [
+        progress >= 3.6 for progress in progress
+    ]
+    assert run.checkpoint(5)["optimisers/generator/param_groups/0/lr"] == pytest.approx(0.01 / 3)
+    assert run.train(**{"run.minutes": 0.15}).step > 5
+
+
+def test_batches_are_halved_by_the_clock_as_by_number(tmp_path: Path, run: Run) -> None:
+    sizes: list[int] = []
+    planned = plan_new_run(
+        run.folder, {**run.settings, "run.minutes": 10, "optimiser.half_size": 1}
+    )
+    trainer = prepare(planned, lambda _event: None)
+    trainer._players.generator.register_forward_pre_hook(
+        lambda _module, inputs: sizes.extend(each.shape[-1] for each in inputs[:3])
+    )
+    trainer.train(lambda: True)
+    assert sizes == [32, 32, 32]
 
 
 def test_a_run_can_be_made_longer(tmp_path: Path, run: Run) -> None:
