@@ -1,13 +1,15 @@
-"""Make the README's pictures: `python tools/make_figures.py` (needs the `people` extra).
+"""Make the README's pictures: `python tools/make_figures.py ASSETS` (needs the `people` extra).
 
 `docs/demo.png`: the demo's photo, and its motion over the result at six moments.
 `docs/how_it_works.png`: what each step of the method hands to the next.
-`docs/people.jpg`: synthetic people with their IUV.
+`docs/people.jpg`: synthetic people with their IUV, half of them in MakeHuman's assets, whose folder
+is named.
 `docs/astronaut.jpg`: a photo alone, its estimated IUV and texture, and frames (needs the models).
 """
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from threading import Event
 
@@ -37,7 +39,7 @@ PANEL_PX = 240
 LABEL_PX = 44
 
 
-def main() -> None:
+def main(assets: Path) -> None:
     options = RenderOptions(
         source=DEMO / "source.png", driver=DEMO / "driver.mkv", output=Path("unused.mp4")
     )
@@ -69,7 +71,7 @@ def main() -> None:
     )
     save(ROOT / "docs" / "demo.png", np.hstack([photo, np.vstack(rows)]))
 
-    save(ROOT / "docs" / "people.jpg", people_sheet())
+    save(ROOT / "docs" / "people.jpg", people_sheet(assets))
     save(ROOT / "docs" / "astronaut.jpg", photo_alone())
 
     partial = np.where(source.visibility[0, 0, ..., None] > 0, picture(source.texture), 255)
@@ -104,9 +106,9 @@ def photo_alone() -> np.ndarray:
     )
 
 
-def people_sheet() -> np.ndarray:
+def people_sheet(assets: Path) -> np.ndarray:
     """Rows of photos, each with its IUV to the right."""
-    stream = PeopleStream(seed=PEOPLE_SEED, size=(160, 160))
+    stream = PeopleStream(seed=PEOPLE_SEED, size=(160, 160), assets=assets)
     cells = []
     for number in range(PEOPLE_ROWS * PEOPLE_COLUMNS):
         photo = stream.take(stream.dress(number), stream.shot(number, 0))
@@ -151,4 +153,4 @@ def save(path: Path, image: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]))
