@@ -250,7 +250,7 @@ class OptimiserSettings:
     batch_size: Count = option(
         "--batch-size",
         "Speed",
-        "Pairs at once on each device; default 4.",
+        "Pairs at once on each device; default 4, with people on a GPU 48.",
         kind="integer",
         default=4,
     )
@@ -277,7 +277,7 @@ class SpeedSettings:
     workers: Annotated[int, Field(ge=-1)] = option(
         "--workers",
         "Speed",
-        "Processes that read or paint; default: half of the cores.",
+        "Processes that read or paint; default: half of the cores, or all but one for a GPU.",
         kind="integer",
         default=-1,
     )

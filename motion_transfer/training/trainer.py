@@ -93,7 +93,6 @@ class Trainer:
         self._judges = judges.to(self._device)
         arrange(self._judges.perceptual)
         self.step = max(list_steps(run), default=0)
-        self._painters = self._start_painters()  # who paint while the rest is prepared
         self._state = build_state(config, init, self._device)
         self._average = self._state.average and Average(
             self._state.average, config.optimiser.ema_decay
@@ -110,6 +109,7 @@ class Trainer:
         if self.step:
             digest = self._data.digest
             self._seconds = read_state(run, self.step, self._state, data_digest=digest)
+        self._painters = self._start_painters()  # they get ready while the rest is prepared
         self._samples = self._make_samples()
         self._board: SummaryWriter | None = None
         self._previews: list[Preview] = []

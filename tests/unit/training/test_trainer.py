@@ -278,6 +278,17 @@ def test_runs_on_the_same_photos_may_share_their_textures(run: Run) -> None:
     assert {path: path.stat().st_mtime_ns for path in shared.iterdir()} == before
 
 
+def test_people_on_a_gpu_have_a_recipe_of_their_own(run: Run, monkeypatch) -> None:
+    monkeypatch.setattr("torch.cuda.is_available", lambda: True)
+    shape = {name: value for name, value in run.settings.items() if name.startswith("model.")}
+    found = plan_new_run(run.folder, shape).config.optimiser
+    assert (found.batch_size, found.learning_rate, found.ema_decay) == (48, 4e-4, 0.998)
+    chosen = plan_new_run(run.folder, {**shape, "optimiser.batch_size": 3}).config.optimiser
+    assert (chosen.batch_size, chosen.decay_from) == (3, pytest.approx(2 / 3))
+    photos = {**shape, "data.source": "pairs.csv"}
+    assert plan_new_run(run.folder, photos).config.optimiser.batch_size == 4
+
+
 def test_fine_tuning_starts_from_what_ships(run: Run) -> None:
     shape = {name: value for name, value in run.settings.items() if not name.startswith("model.")}
     planned = plan_new_run(run.folder, {**shape, "run.init": "lite"})
