@@ -42,16 +42,17 @@ PEOPLE_RECIPE: dict[str, Any] = {
     "model.alpha": True,
     "losses.identity": "none",
     "losses.head_weight": 3.0,
-    "losses.matching_weight": 1.0,
+    "losses.matching_weight": 4.0,
     "losses.r1_weight": 0.002,
     "losses.adversarial_from": 0.85,
     "optimiser.half_size": 0.7,
 }
 """What synthetic people change: they come with alpha, and are trained on without any file, on
 whatever machine there is. Departs from the paper: no face identity loss, as no weights of
-SphereFace may be shipped; most steps are made at half size, and the discriminator joins late, held
-by feature matching, about as large a term as the perceptual one, and by R1, as weak as in LaMa
-(Suvorov et al., WACV 2022: 0.001 without the half), whose discriminator is Pix2PixHD's, too."""
+SphereFace may be shipped; most steps are made at half size, and the discriminator joins late. It is
+held by feature matching, weighted so that this is about as large a term as the perceptual one (0.16
+to 0.20 before, when a new discriminator meets `lite`), and by R1, as weak as in LaMa (Suvorov et
+al., WACV 2022: 0.001 without the half), whose discriminator is Pix2PixHD's, too."""
 
 GPU_RECIPE: dict[str, Any] = {
     "optimiser.batch_size": 48,

@@ -22,8 +22,9 @@ from motion_transfer.training.samples import UNKNOWN_CLEARANCE, background_colou
 from nhrr_core import extract_texture, load_uv_layout
 from nhrr_core.clearance import CLEARANCE_SIZE
 
-FIRST_PEOPLE = 32
-"""So many are there before the first step: enough that batches differ; chosen."""
+FIRST_PEOPLE, FIRST_OF_BATCH = 32, 4
+"""So many, or so many for each of a batch if that is less, are there before the first step: enough
+that batches differ; chosen."""
 
 UNFOLDED_AT_ONCE = 8
 """People; so many are taken in before a step at most, which keeps it from waiting for more."""
@@ -77,7 +78,7 @@ class PeoplePool:
 
     def _take_in(self) -> None:
         """Keep who is painted, if it is time for new people; wait for the first ones."""
-        first = min(FIRST_PEOPLE, self._size)
+        first = min(FIRST_PEOPLE, FIRST_OF_BATCH * self._config.optimiser.batch_size, self._size)
         while self._added < first:
             self._add(self._painted(min(UNFOLDED_AT_ONCE, first - self._added), wait_for_one=True))
         behind = first + self._drawn // self._config.data.draws - self._added
