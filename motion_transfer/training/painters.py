@@ -16,7 +16,6 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 
 import cv2
 import numpy as np
-import torch
 from jaxtyping import Float16, UInt8
 
 from motion_transfer.drawing.outline import clearance_of
@@ -33,6 +32,13 @@ MOST_SKIPPED = 5
 
 ASKED_EACH = 2
 """People asked for at once of each process: one is painted, the next one waits."""
+
+
+PAINTERS_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "CUDA_VISIBLE_DEVICES": "",
+}
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,7 @@ class Painters:
             # spawned: neither torch's threads nor a GPU survive a fork
             self._pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin_painter)
             resource_tracker.ensure_running()  # which would be deaf as well if it began inside
-            with _deaf():
+            with _starting_painters():
                 self._ask(self._pool)
 
     def take(self, *, wait_for_one: bool) -> PaintedPerson | None:
@@ -160,8 +166,6 @@ class Painters:
 
 def _begin_painter() -> None:
     threading.Thread(target=_follow_parent, daemon=True).start()
-    os.environ["CUDA_VISIBLE_DEVICES"] = ""  # the body model's kernels would use one, too
-    torch.set_num_threads(1)
     cv2.setNumThreads(1)
     keep_memory()
 
@@ -174,10 +178,18 @@ def _follow_parent() -> None:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
-    """Keep Ctrl-C and SIGTERM from processes that begin inside: this one ends them."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+def _starting_painters() -> Iterator[None]:
+    """Let processes begin inside with one thread and no GPU; Ctrl-C is heard by this one alone."""
+    heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    # libraries read it when they are loaded, which is before a process could say so itself
+    before = {name: os.environ.get(name) for name in PAINTERS_ENVIRONMENT}
+    os.environ.update(PAINTERS_ENVIRONMENT)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)

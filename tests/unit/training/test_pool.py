@@ -180,6 +180,17 @@ def test_processes_paint_ahead_but_not_for_ever() -> None:
         painters.close()
 
 
+def test_painters_have_one_thread_and_no_gpu() -> None:
+    before = dict(os.environ)
+    names = iter(["CUDA_VISIBLE_DEVICES", "OMP_NUM_THREADS"])
+    painters = Painters(os.getenv, names, workers=1, note=ignore)  # type: ignore[arg-type]
+    try:
+        assert [painters.take(wait_for_one=True) for _ in range(2)] == ["", "1"]
+    finally:
+        painters.close()
+    assert dict(os.environ) == before
+
+
 @pytest.mark.parametrize("workers", [0, 1])
 def test_who_cannot_be_painted_is_left_out_with_a_note(workers: int) -> None:
     notes: list[str] = []
