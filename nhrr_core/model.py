@@ -169,7 +169,7 @@ class NeuralReRenderer(nn.Module):
         if self.config.geometry:
             known.append(self._places_like(texture))
         if self.prior is not None:
-            prior = F.adaptive_avg_pool2d(self.prior, texture.shape[2:])
+            prior = F.adaptive_avg_pool2d(self.prior, (texture.shape[2], texture.shape[3]))
             known.append(prior.to(texture.dtype).expand_as(texture))
         return [texture, *known]
 
