@@ -22,7 +22,7 @@ from motion_transfer.training.config import TrainConfig, build_config, read_sett
 from motion_transfer.weights.checkpoint import inspect_checkpoint, load_checkpoint, save_checkpoint
 
 ROOT = Path(__file__).parents[1]
-TERMS = ("perceptual", "texture", "alpha", "adversarial", "discriminator")
+TERMS = ("perceptual", "head", "texture", "alpha", "adversarial", "discriminator")
 WINDOW = 20  # logged values in a moving average
 
 Row = dict[str, float | None]

@@ -15,7 +15,7 @@ SMALL = ModelConfig(
 )
 
 
-@pytest.mark.parametrize("new", [("clearance",), ("geometry",), ("clearance", "geometry")])
+@pytest.mark.parametrize("new", [("clearance",), ("prior",), ("clearance", "geometry")])
 def test_new_inputs_begin_without_effect(new: tuple[str, ...]) -> None:
     """A run from weights that know of none draws at first what they draw."""
     init = NeuralReRenderer(SMALL).eval()
@@ -38,6 +38,12 @@ def test_networks_are_compiled_for_the_sizes_they_meet(monkeypatch: pytest.Monke
     """
     asked: list[object] = []
     monkeypatch.setattr(nn.Module, "compile", lambda _, **how: asked.append(how))
-    config = build_config({"run.steps": 1, "speed.compile": True}, model=SMALL)
-    build_state(config, None, torch.device("cpu"))
+    settings = {"run.steps": 1, "speed.compile": True}
+    build_state(
+        build_config({**settings, "losses.r1_weight": 0}, model=SMALL), None, torch.device("cpu")
+    )
     assert asked == [{"dynamic": False}] * 3  # FeatureNet, RenderNet, discriminator
+    asked.clear()
+    # a compiled discriminator has no second derivative, which R1 takes
+    build_state(build_config(settings, model=SMALL), None, torch.device("cpu"))
+    assert asked == [{"dynamic": False}] * 2
