@@ -10,8 +10,8 @@ with the truth in place of what has to be guessed:
 `both`: both of these; what is left is what the network makes of things that it was told.
 `target`: the whole texture is unfolded from the target: how well RenderNet draws what it is given.
 
-The numbers are the perceptual distance of `mt eval`, of the whole picture and of the enlarged head,
-mean and the share of what the network leaves as it is.
+The numbers are the perceptual distance of `mt eval`, of the whole picture and of the head, enlarged
+to 96 px as in training (`mt eval` enlarges it to 128): mean, and share of what it is untold.
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ from motion_transfer.media.files import read_bytes
 from motion_transfer.training.faces import CROP_CENTRE as SPHEREFACE_CENTRE
 from motion_transfer.training.faces import CROP_HEIGHT as SPHEREFACE_HEIGHT
 from motion_transfer.training.faces import METRES_PER_CROP_PIXEL as SPHEREFACE_METRES
+from motion_transfer.training.faces import FaceIdentity
 from motion_transfer.training.feature_networks import FrozenNetwork
 
 CHIP_SIZE = 150
@@ -102,6 +103,11 @@ def frame_chips(boxes: Float[Tensor, "B 4"]) -> Float[Tensor, "B 4"]:
     x, y = (left + right) / 2, (top + bottom) / 2 + (SPHEREFACE_CENTRE - CHIP_CENTRE) * px_per_metre
     half = px_per_metre * CHIP_METRES_PER_PX * CHIP_SIZE / 2
     return torch.stack([x - half, y - half, x + half, y + half], 1)
+
+
+def dlib_identity(network: DlibFace) -> FaceIdentity:
+    """Make the face identity loss by this network, whose weights are free."""
+    return FaceIdentity(network, frame=frame_chips, size=(CHIP_SIZE, CHIP_SIZE))
 
 
 def load_dlib_face(path: Path) -> DlibFace:

@@ -9,6 +9,7 @@ around the whole image is (0, 0, W, H). Boxes may be fractional and may reach ou
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -210,13 +211,24 @@ class FaceIdentity(nn.Module):
     """The face identity loss of a batch: find, crop, embed, compare.
 
     Its network is frozen: keep this outside what is optimised and saved.
+
+    Args:
+        frame: Turns the boxes of `find_faces`, SphereFace's, into those that the network wants.
+        size: Of the crops that it takes, (height, width).
     """
 
     table: Tensor
 
-    def __init__(self, network: SphereFace20) -> None:
+    def __init__(
+        self,
+        network: FrozenNetwork,
+        *,
+        frame: Callable[[Tensor], Tensor] = lambda boxes: boxes,
+        size: tuple[int, int] = (CROP_HEIGHT, CROP_WIDTH),
+    ) -> None:
         super().__init__()
         self.network = network
+        self._frame, self._size = frame, size
         self.register_buffer("table", face_table(), persistent=False)
 
     def forward(
@@ -226,7 +238,9 @@ class FaceIdentity(nn.Module):
         iuv: UInt8[Tensor, "B 3 H W"],
     ) -> Float[Tensor, ""]:
         """Compute the loss of generated images, RGB in [-1, 1], whose truth shares their IUV."""
-        boxes, seen = find_faces(iuv, self.table)
+        faces, seen = find_faces(iuv, self.table)
+        boxes = self._frame(faces)
         with torch.no_grad():
-            wanted = self.network(crop_boxes(truth, boxes))
-        return face_identity_loss(self.network(crop_boxes(generated, boxes)), wanted, seen)
+            wanted = self.network(crop_boxes(truth, boxes, self._size))
+        found = self.network(crop_boxes(generated, boxes, self._size))
+        return face_identity_loss(found, wanted, seen)

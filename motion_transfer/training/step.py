@@ -19,19 +19,12 @@ from torch.optim import Optimizer
 from motion_transfer.errors import WeightsError
 from motion_transfer.estimate.models import FACE_NETWORK, find_model
 from motion_transfer.training.config import LossSettings
-from motion_transfer.training.face_networks import (
-    CHIP_SIZE,
-    DlibFace,
-    frame_chips,
-    load_dlib_face,
-)
+from motion_transfer.training.face_networks import dlib_identity, load_dlib_face
 from motion_transfer.training.faces import (
     REMEDY,
     WHAT,
     FaceIdentity,
     crop_boxes,
-    face_table,
-    find_faces,
     find_heads,
     load_sphereface,
 )
@@ -47,7 +40,6 @@ from nhrr_core import (
     adversarial_loss,
     alpha_loss,
     discriminator_loss,
-    face_identity_loss,
     generator_loss,
     matching_loss,
     perceptual_loss,
@@ -64,31 +56,6 @@ HEAD_SIZE = 96
 
 Batch = Mapping[str, Tensor]
 Terms = dict[str, Tensor]
-
-
-class DlibIdentity(nn.Module):
-    """The face identity loss by dlib's network, in place of SphereFace's: its weights are free."""
-
-    table: Tensor
-
-    def __init__(self, network: DlibFace) -> None:
-        super().__init__()
-        self.network = network
-        self.register_buffer("table", face_table(), persistent=False)
-
-    def forward(
-        self,
-        generated: Float[Tensor, "B 3 H W"],
-        truth: Float[Tensor, "B 3 H W"],
-        iuv: UInt8[Tensor, "B 3 H W"],
-    ) -> Float[Tensor, ""]:
-        """Compute the loss of generated images, RGB in [-1, 1], whose truth shares their IUV."""
-        faces, seen = find_faces(iuv, self.table)
-        boxes, size = frame_chips(faces), (CHIP_SIZE, CHIP_SIZE)
-        with torch.no_grad():
-            wanted = self.network(crop_boxes(truth, boxes, size))
-        found = self.network(crop_boxes(generated, boxes, size))
-        return face_identity_loss(found, wanted, seen)
 
 
 class Generator(nn.Module):
@@ -134,7 +101,7 @@ class Judges:
     """The frozen networks; None where the loss is left out."""
 
     perceptual: FeatureNetwork | None = None
-    identity: FaceIdentity | DlibIdentity | None = None
+    identity: FaceIdentity | None = None
 
     def to(self, device: torch.device) -> Judges:
         """Move them to a device."""
@@ -160,7 +127,7 @@ def load_judges(settings: LossSettings) -> Judges:
             raise WeightsError(f"{WHAT} are not given; {REMEDY}")
         identity = FaceIdentity(load_sphereface(Path(settings.sphereface_file)))
     elif settings.identity == "dlib":
-        identity = DlibIdentity(load_dlib_face(find_model(FACE_NETWORK)))
+        identity = dlib_identity(load_dlib_face(find_model(FACE_NETWORK)))
     return Judges(perceptual, identity)
 
 

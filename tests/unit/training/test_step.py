@@ -12,13 +12,12 @@ from torch import Tensor, nn
 
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.training.config import LossSettings
-from motion_transfer.training.face_networks import DlibFace
+from motion_transfer.training.face_networks import DlibFace, dlib_identity
 from motion_transfer.training.faces import FaceIdentity, SphereFace20, face_table
 from motion_transfer.training.feature_networks import FeatureNetwork
 from motion_transfer.training.step import (
     Arithmetic,
     Average,
-    DlibIdentity,
     Drawn,
     Generator,
     Judges,
@@ -300,7 +299,7 @@ def test_a_missing_network_is_an_error_with_its_way_out(
 
 
 def test_identity_by_dlib_looks_at_the_face_alone(face_iuv: Tensor) -> None:
-    judge = DlibIdentity(DlibFace())
+    judge = dlib_identity(DlibFace())
     truth = torch.rand(1, 3, 96, 96) * 2 - 1
     drawn = truth.clone().requires_grad_()
     assert judge(drawn, truth, face_iuv) == 0
