@@ -14,7 +14,7 @@ from motion_transfer.estimate.blazeface import FACE_SIZE, FaceDetector
 from motion_transfer.estimate.models import FACE_DETECTOR, FACE_NETWORK, find_model
 from motion_transfer.evaluation.framing import Image, PairPictures
 from motion_transfer.evaluation.measures import Column, Numbers, hash_weights, to_tensor
-from motion_transfer.evaluation.region_measures import mark_face, stack_iuv
+from motion_transfer.evaluation.region_measures import mark_face
 from motion_transfer.training.face_networks import (
     CHIP_SIZE,
     frame_chips,
@@ -29,6 +29,7 @@ from motion_transfer.training.faces import (
     find_faces,
     find_heads,
 )
+from motion_transfer.training.metrics import stack_iuv
 
 LEAST_EVEN = 0.5  # of one half of the face to the other, in pixels
 MIN_FACE_HEIGHT = 10  # px, chin to eyebrows

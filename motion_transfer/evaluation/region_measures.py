@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import torch
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool
 from torch import Tensor
 
 from motion_transfer.evaluation.framing import Image, PairPictures
@@ -35,6 +35,7 @@ from motion_transfer.training.metrics import (
     flat_windows,
     lattice_energy,
     shown_pixels,
+    stack_iuv,
 )
 
 HEAD_SIZE = 128  # px: four of the coarsest features along a side, and no head of 256 px is larger
@@ -145,11 +146,6 @@ class CheckerboardMeasure:
     def measure(self, shown: PairPictures, _before: PairPictures | None = None) -> list[Numbers]:
         corners = flat_windows(shown.target.rgb, shown.target.iuv[..., 0] > 0)
         return [lattice_energy(result, corners) for result in shown.results]
-
-
-def stack_iuv(iuv: Image) -> UInt8[Tensor, "1 3 H W"]:
-    """Make a batch of one IUV image."""
-    return torch.from_numpy(np.ascontiguousarray(iuv)).permute(2, 0, 1)[None]
 
 
 def mark_face(iuv: Image, table: Bool[Tensor, "25 256 256"]) -> Bool[np.ndarray, "H W"]:

@@ -199,15 +199,17 @@ def shown_pixels(source_iuv: Image, target_iuv: Image) -> Mask:
     The IUV images may differ in size. Places are texels of a texture of 128 x 128; a source shows
     all of its own.
     """
-    source, target = (
-        torch.from_numpy(np.ascontiguousarray(iuv)).permute(2, 0, 1)[None]
-        for iuv in (source_iuv, target_iuv)
-    )
+    source, target = stack_iuv(source_iuv), stack_iuv(target_iuv)
     charts = load_uv_layout().charts
     _, visibility = extract_texture(source.float(), source, charts, SHOWN_TEXELS)
     place = texture_coordinates(target, charts)
     column, row = (place * SHOWN_TEXELS).long().clamp(0, SHOWN_TEXELS - 1).unbind(-1)
     return ((visibility[0, 0, row, column] > 0) & (target[:, 0] > 0))[0].numpy()
+
+
+def stack_iuv(iuv: Image) -> UInt8[Tensor, "1 3 H W"]:
+    """Make a batch of one IUV image."""
+    return torch.from_numpy(np.ascontiguousarray(iuv)).permute(2, 0, 1)[None]
 
 
 def frechet_distance(first: Float[np.ndarray, "N D"], second: Float[np.ndarray, "M D"]) -> float:
