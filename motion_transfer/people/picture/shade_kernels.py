@@ -336,8 +336,8 @@ def shade_samples(
     material = materials[int(piece[face])]
     texel = _texel(texture, material, uv[0], uv[1])
     albedo = wp.vec3(texel[0], texel[1], texel[2])
+    area_px = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
     if material.overlaid != 0:
-        area_px = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
         size = _picture_size(material.picture, ta, tb, tc, area_px)
         albedo = _overlay_albedo(material, _picture_at(material.picture, size, uv[0], uv[1]))
     result = albedo
@@ -348,7 +348,7 @@ def shade_samples(
             normals[corners[0]] * wa + normals[corners[1]] * wb + normals[corners[2]] * wc
         )
         view = wp.normalize(light.camera - point)
-        if (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1]) > 0.0:
+        if area_px > 0.0:
             normal = -normal  # the inside of cloth or hair
 
         # directions in which u and v grow on the surface, for relief and strands
@@ -367,7 +367,6 @@ def shade_samples(
                 slope_v = (below[3] - texel[3]) / (dv * material.size[1])
                 normal = wp.normalize(normal - along_u * slope_u - along_v * slope_v)
             if material.overlaid != 0 and material.normals.height > 0:
-                area_px = (sb[0] - sa[0]) * (sc[1] - sa[1]) - (sc[0] - sa[0]) * (sb[1] - sa[1])
                 size = _picture_size(material.normals, ta, tb, tc, area_px)
                 bent = _picture_at(material.normals, size, uv[0], uv[1])
                 normal = wp.normalize(
