@@ -70,6 +70,7 @@ class Source:
         alpha: How much of each pixel is the person, 0..255, where the IUV was estimated.
         clearance: Of clothes and hair, see `nhrr_core.unfold_clearance`; 0 where it is not known.
         notes: What the user should know of how the photos are read, in sentences.
+        kept: The file that it was read from, see `kept_source`, which holds feature maps of it.
     """
 
     photo: Photo
@@ -80,6 +81,7 @@ class Source:
     alpha: UInt8[np.ndarray, "H W"] | None = None
     clearance: Float[Tensor, "1 2 128 128"] | None = None
     notes: tuple[str, ...] = ()
+    kept: Path | None = None
 
 
 def unfold_source(

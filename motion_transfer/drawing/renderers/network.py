@@ -20,6 +20,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
+from motion_transfer.drawing.kept_source import load_features
 from motion_transfer.drawing.person import disc, occupancy
 from motion_transfer.drawing.renderers.interface import Appearance, Occupied
 from motion_transfer.drawing.source import Source
@@ -89,6 +90,12 @@ class NetworkRecipe:
         return recipe
 
     def appearance_of(self, source: Source) -> Appearance:
+        if source.kept is not None:
+            config = inspect_checkpoint(self.weights).config
+            side = config.finest_texture
+            shape = (1, config.map_channels, side, side)
+            if (kept := load_features(source.kept, self.content, shape)) is not None:
+                return kept.numpy()
         return encode_source(_open_model(self.weights, self.content), source).numpy()
 
     def renderer(self, appearance: Appearance) -> NeuralRenderer:

@@ -19,7 +19,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.pictures.colours import ProfileError, convert_lab, convert_to_srgb
-from motion_transfer.media.pictures.png import find_png_fault
+from motion_transfer.media.pictures.png import SIGNATURE, find_png_fault
 from motion_transfer.media.quiet import quiet_libraries
 
 HEIF_BRANDS = set(b"heic heix heim heis hevc hevx hevm hevs mif1 msf1".split())
@@ -88,6 +88,17 @@ def read_photo(path: Path, what: str = "source") -> Photo:
     """
     data = read_bytes(path, what)
     where = f"{what} {path}"
+    return _decode(data, path, where)
+
+
+def decode_png(data: bytes, path: Path, where: str) -> Photo:
+    """Decode what `encode_png` made, and came out of the file at a path. Raises: InputError."""
+    if not data.startswith(SIGNATURE):
+        raise InputError(f"{where} is damaged: it holds a picture that is no PNG; save it again")
+    return _decode(data, path, where)
+
+
+def _decode(data: bytes, path: Path, where: str) -> Photo:
     with explain_damage(where), open_image(io.BytesIO(data), where) as file:
         if fault := find_png_fault(data):
             raise InputError(f"{where} is {fault}; save it again")
@@ -234,9 +245,13 @@ def write_png(path: Path, pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray,
     path.write_bytes(encoded.tobytes())
 
 
-def encode_png(pixels: UInt8[np.ndarray, "H W 3"], *, compression: int = 1) -> bytes:
-    """Encode an RGB picture as PNG; `compression` from 0 (large, fast) to 9."""
-    _, encoded = cv2.imencode(".png", pixels[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, compression))
+def encode_png(
+    pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W 4"], *, compression: int = 1
+) -> bytes:
+    """Encode an RGB or RGBA picture as PNG; `compression` from 0 (large, fast) to 9."""
+    order = [2, 1, 0, 3][: pixels.shape[-1]]  # OpenCV's
+    settings = (cv2.IMWRITE_PNG_COMPRESSION, compression)
+    _, encoded = cv2.imencode(".png", pixels[..., order], settings)
     return encoded.tobytes()
 
 

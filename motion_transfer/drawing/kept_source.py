@@ -1,0 +1,260 @@
+"""A source in one file: unfolded and encoded once, rendered from as often as wanted, anywhere.
+
+The file is safetensors. Its metadata are one JSON text (`FACTS`), its tensors:
+
+    photo             the picture as PNG, with its alpha if it has one
+    person            (I, U, V) as PNG; the person's alpha, where somebody could tell, is the fourth
+    texture/T         3 x T x T float32, the partial texture; for one or several sizes T
+    visibility/T      1 x T x T uint8, 0 or 1
+    clearance         2 x 128 x 128 float32, see `nhrr_core.unfold_clearance`
+    features/DIGEST   D x T x T float32, the feature map that the weights with that SHA-256 make
+
+Textures and feature maps are kept as they were computed, and pictures without loss: what is drawn
+from the file equals what is drawn from the photos, to the byte.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, UInt8
+from safetensors import safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from motion_transfer.drawing.source import Source
+from motion_transfer.errors import InputError
+from motion_transfer.media.files import check_readable
+from motion_transfer.media.pictures.photo import Photo, decode_png, encode_png
+from motion_transfer.media.structured import parse_json, shown
+from motion_transfer.version import __version__
+from motion_transfer.weights.tensors import first_line
+from nhrr_core import shrink_texture
+from nhrr_core.clearance import CLEARANCE_SIZE
+from nhrr_core.iuv import PART_COUNT
+
+FACTS = "kept_source"
+"""The only key of the metadata: several would come in another order in every file."""
+
+FORMAT = 1
+"""Goes up whenever an older program would misread a file, or draw something else from it."""
+
+COMPRESSION = 6  # zlib's own choice; a photo of 12 megapixels takes a second or two
+LARGEST_TEXTURE = 8192  # texels a side; a gigabyte, and no camera sees a body finer
+ROUNDING = 1e-4  # by which means of colours in [-1, 1] may leave that range
+
+AGAIN = "copy it again, or save it again with `mt source save`"
+
+
+def save_source(
+    path: Path,
+    sources: Sequence[Source],
+    features: Mapping[str, Float[Tensor, "1 D T T"]],
+    facts: Mapping[str, Any],
+) -> None:
+    """Write a source; the same content gives the same bytes.
+
+    Args:
+        sources: One source, unfolded to one or several sizes of texture.
+        features: What weights make of it, by the SHA-256 of the weights, hexadecimal.
+        facts: Where it comes from, as JSON can hold it.
+    Raises: OSError.
+    """
+    source = sources[0]
+    photo, alphas = source.photo, (source.photo.alpha, source.alpha)
+    tensors = {
+        name: torch.from_numpy(np.frombuffer(_pack(colours, alpha), np.uint8).copy())
+        for name, colours, alpha in zip(
+            ("photo", "person"), (photo.rgb, source.iuv), alphas, strict=True
+        )
+    }
+    for each in sources:
+        size = each.texture.shape[-1]
+        tensors[f"texture/{size}"] = each.texture[0]
+        tensors[f"visibility/{size}"] = each.visibility[0].to(torch.uint8)
+    if source.clearance is not None:
+        tensors["clearance"] = source.clearance[0]
+    tensors |= {f"features/{digest}": each[0] for digest, each in features.items()}
+    told = {**facts, "format": FORMAT, "program": __version__, "notes": list(source.notes)}
+    metadata = {FACTS: json.dumps(told, sort_keys=True, ensure_ascii=False)}
+    save_file({name: each.contiguous() for name, each in tensors.items()}, path, metadata=metadata)
+    path.chmod(0o644)  # safetensors writes for the owner only
+
+
+def load_source(path: Path, texture_size: int) -> Source:
+    """Read a source, with a texture of the size that is wanted.
+
+    Where that size is not kept, it is made from the finest that is.
+
+    Raises: InputError if the file is missing, damaged, of another kind or by a newer program.
+    """
+    with _open(path) as file:
+        photo = decode_png(file.read("photo", "U8", (None,)).numpy().tobytes(), path, file.where)
+        person = decode_png(file.read("person", "U8", (None,)).numpy().tobytes(), path, file.where)
+        texture, visibility, note = _read_texture(file, texture_size)
+        clearance = None
+        if "clearance" in file.shapes:
+            clearance = file.read("clearance", "F32", (2, CLEARANCE_SIZE, CLEARANCE_SIZE))[None]
+    iuv = person.rgb
+    file.expect(iuv.shape == photo.rgb.shape, "its person and its photo differ in size")
+    file.expect(iuv[..., 0].max() <= PART_COUNT, "its person has parts that no body has")
+    file.expect(iuv[..., 0].any(), "it shows nobody")
+    return Source(
+        photo,
+        iuv,
+        None,
+        texture,
+        visibility,
+        alpha=person.alpha,
+        clearance=clearance,
+        notes=(*file.notes, *note),
+        kept=path,
+    )
+
+
+def load_features(
+    path: Path, digest: str, shape: tuple[int, int, int, int]
+) -> Float[Tensor, "1 D T T"] | None:
+    """Read the feature map that some weights made; None if only others did.
+
+    Args:
+        digest: SHA-256 of the weights, hexadecimal.
+        shape: Of the map that they make.
+    Raises: InputError as `load_source`.
+    """
+    with _open(path) as file:
+        name = f"features/{digest}"
+        return file.read(name, "F32", shape[1:])[None] if name in file.shapes else None
+
+
+def inspect_source(path: Path) -> dict[str, Any]:
+    """Tell what a kept source says of itself and holds, without decoding it. Raises: InputError."""
+    with _open(path) as file:
+        held = {name: f"{file.kinds[name]} {list(size)}" for name, size in file.shapes.items()}
+        return {**file.facts, "tensors": dict(sorted(held.items()))}
+
+
+@dataclass(frozen=True)
+class _File:
+    """An open kept source; everything that is read is checked.
+
+    Attributes:
+        where: Names it in messages.
+        shapes, kinds: Of its tensors, by name.
+    """
+
+    where: str
+    handle: Any
+    facts: dict[str, Any]
+    shapes: dict[str, tuple[int, ...]]
+    kinds: dict[str, str]
+
+    def expect(self, holds: Any, otherwise: str) -> None:
+        """Raise InputError, saying what is wrong, unless something holds."""
+        if not holds:
+            raise InputError(f"{self.where} is damaged: {otherwise}; {AGAIN}")
+
+    def read(self, name: str, kind: str, shape: tuple[int | None, ...]) -> Tensor:
+        """Read a tensor of a kind and a shape, None for any length; numbers are finite."""
+        self.expect(name in self.shapes, f"{name} is missing")
+        found, held = self.shapes[name], self.kinds[name]
+        fits = len(found) == len(shape) and all(
+            wanted in (None, length) for wanted, length in zip(shape, found, strict=True)
+        )
+        wanted = " x ".join("any" if length is None else str(length) for length in shape)
+        self.expect(
+            fits and held == kind, f"{name} is {held} {list(found)}, where {kind} {wanted} belongs"
+        )
+        tensor = self.handle.get_tensor(name)
+        self.expect(
+            not tensor.is_floating_point() or tensor.isfinite().all(),
+            f"{name} holds values that are no finite numbers",
+        )
+        return tensor
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        notes = self.facts.get("notes", [])
+        told = isinstance(notes, list) and all(isinstance(note, str) for note in notes)
+        self.expect(told, f"its notes are {shown(notes)}")
+        return tuple(notes)
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[_File]:
+    """Open a file and read what it says of itself. Raises: InputError."""
+    where = f"source {path}"
+    check_readable(path, "source")
+    try:
+        handle = safe_open(path, framework="pt")
+    except Exception as error:  # of a lying header they have no common base
+        raise InputError(
+            f"{where} is not a whole safetensors file ({first_line(error)}); {AGAIN}"
+        ) from error
+    with handle as file:
+        written = (file.metadata() or {}).get(FACTS)
+        if written is None:
+            raise InputError(
+                f"{where} is a safetensors file, but no kept source; make one with `mt source save`"
+            )
+        facts = parse_json(written, where)
+        version = facts.get("format") if isinstance(facts, dict) else None
+        if isinstance(version, int) and version > FORMAT:
+            raise InputError(
+                f"{where} was saved by a newer motion-transfer ({shown(facts.get('program'))}; this"
+                f" is {__version__}); update this one, or save it again here"
+            )
+        if version != FORMAT:
+            raise InputError(f"{where} is damaged: its format is {shown(version)}; {AGAIN}")
+        parts = {name: file.get_slice(name) for name in file.keys()}  # noqa: SIM118 - no mapping
+        yield _File(
+            where,
+            file,
+            facts,
+            {name: tuple(part.get_shape()) for name, part in parts.items()},
+            {name: part.get_dtype() for name, part in parts.items()},
+        )
+
+
+def _read_texture(
+    file: _File, wanted: int
+) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"], list[str]]:
+    """Read texture and visibility, and say so where they are coarser than wanted."""
+    kept = [
+        shape[-1]
+        for name, shape in file.shapes.items()
+        if shape and name == f"texture/{shape[-1]}" and 0 < shape[-1] <= LARGEST_TEXTURE
+    ]
+    file.expect(kept, "it has no texture")
+    size = wanted if wanted in kept else max(kept)
+    texture = file.read(f"texture/{size}", "F32", (3, size, size))[None]
+    visibility = file.read(f"visibility/{size}", "U8", (1, size, size))[None].float()
+    file.expect(visibility.max() <= 1, "its visibility is neither 0 nor 1")
+    file.expect(
+        texture.abs().max() <= 1 + ROUNDING, "its texture has colours beyond black or white"
+    )
+    file.expect(
+        not (texture * (1 - visibility)).any(), "its texture has colours where none is seen"
+    )
+    if size == wanted:
+        return texture, visibility, []
+    if size % wanted == 0:
+        return *shrink_texture(texture, visibility, size // wanted), []
+    note = f"{file.where} was saved with {size} texels a side, and these weights use {wanted}"
+    resized = (F.interpolate(each, (wanted, wanted)) for each in (texture, visibility))
+    return *resized, [f"{note}; to draw it finer, save it again with their --weights"] * (
+        size < wanted
+    )
+
+
+def _pack(colours: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"] | None) -> bytes:
+    pixels = colours if alpha is None else np.dstack([colours, alpha])
+    return encode_png(pixels, compression=COMPRESSION)
