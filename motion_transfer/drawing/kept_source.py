@@ -33,7 +33,7 @@ from torch import Tensor
 from motion_transfer.drawing.source import Source
 from motion_transfer.errors import InputError
 from motion_transfer.media.files import check_readable
-from motion_transfer.media.pictures.photo import Photo, decode_png, encode_png
+from motion_transfer.media.pictures.photo import decode_png, encode_png
 from motion_transfer.media.structured import parse_json, shown
 from motion_transfer.version import __version__
 from motion_transfer.weights.tensors import first_line
@@ -238,21 +238,15 @@ def _read_texture(
     texture = file.read(f"texture/{size}", "F32", (3, size, size))[None]
     visibility = file.read(f"visibility/{size}", "U8", (1, size, size))[None].float()
     file.expect(visibility.max() <= 1, "its visibility is neither 0 nor 1")
-    file.expect(
-        texture.abs().max() <= 1 + ROUNDING, "its texture has colours beyond black or white"
-    )
-    file.expect(
-        not (texture * (1 - visibility)).any(), "its texture has colours where none is seen"
-    )
-    if size == wanted:
-        return texture, visibility, []
+    file.expect(texture.abs().max() <= 1 + ROUNDING, "its colours are beyond black or white")
+    file.expect(not (texture * (1 - visibility)).any(), "it has colours where nothing is seen")
     if size % wanted == 0:
         return *shrink_texture(texture, visibility, size // wanted), []
+    texture, visibility = (F.interpolate(each, (wanted, wanted)) for each in (texture, visibility))
+    if size > wanted:
+        return texture, visibility, []
     note = f"{file.where} was saved with {size} texels a side, and these weights use {wanted}"
-    resized = (F.interpolate(each, (wanted, wanted)) for each in (texture, visibility))
-    return *resized, [f"{note}; to draw it finer, save it again with their --weights"] * (
-        size < wanted
-    )
+    return texture, visibility, [f"{note}; for a finer picture save it again with their --weights"]
 
 
 def _pack(colours: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"] | None) -> bytes:
