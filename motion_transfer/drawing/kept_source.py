@@ -205,7 +205,10 @@ def _open(path: Path) -> Iterator[_File]:
             raise InputError(
                 f"{where} is a safetensors file, but no kept source; make one with `mt source save`"
             )
-        facts = parse_json(written, where)
+        try:
+            facts = parse_json(written, where)
+        except InputError as error:
+            raise InputError(f"{error}; {AGAIN}") from None
         version = facts.get("format") if isinstance(facts, dict) else None
         if isinstance(version, int) and version > FORMAT:
             raise InputError(
