@@ -150,7 +150,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
     from motion_transfer.render.run import prepare
 
     options = RenderOptions(
-        source=SOURCE,
+        source=(SOURCE,),
         driver=driver_folder(folder, sizes.frames),
         output=folder / "overhead.mp4",
         renderer="nhrr",

@@ -36,7 +36,7 @@ from motion_transfer.render.run import prepare, run
 def texture_rate(folder: Path, frame_count: int, rounds: int) -> None:
     driver = driver_folder(folder, frame_count)
     options = RenderOptions(
-        source=SOURCE,
+        source=(SOURCE,),
         driver=driver,
         output=folder / "texture.mp4",
         renderer="texture",
@@ -53,7 +53,7 @@ def texture_rate(folder: Path, frame_count: int, rounds: int) -> None:
 def nhrr_overhead(folder: Path, frame_count: int, preset: str, rounds: int) -> None:
     driver = driver_folder(folder, frame_count)
     options = RenderOptions(
-        source=SOURCE,
+        source=(SOURCE,),
         driver=driver,
         output=folder / "nhrr.mp4",
         weights=weights_of(folder, preset),

@@ -163,7 +163,7 @@ def measure_page(rounds: int = 5) -> None:
 
 def measure_latency(renderer: str, count: int) -> None:
     options = RenderOptions(
-        source=SOURCE, driver=DRIVER, output=Path("unused.mp4"), renderer=renderer
+        source=(SOURCE,), driver=DRIVER, output=Path("unused.mp4"), renderer=renderer
     )
     with TemporaryDirectory() as folder, server(renderer) as page:
         driver = PreviewedDriver(open_driver(options, Path(folder), ignore))

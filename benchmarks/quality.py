@@ -111,7 +111,7 @@ def walk(samples: Path, photo: Path, weights: Path, folder: Path) -> Walk:
         output = folder / f"{photo.stem}-{renderer}"
         run(
             RenderOptions(
-                source=photo,
+                source=(photo,),
                 driver=driver,
                 output=output,
                 renderer=renderer,

@@ -18,11 +18,11 @@ AnyPath = str | PathLike[str]
 
 
 def render_video(
-    source: AnyPath,
+    source: AnyPath | Sequence[AnyPath],
     driver: AnyPath,
     output: AnyPath,
     *,
-    source_iuv: AnyPath | None = None,
+    source_iuv: AnyPath | Sequence[AnyPath] | None = None,
     person: str = "largest",
     source_iuv_order: ChannelOrder | None = None,
     garments: Sequence[Garment] = (),
@@ -55,13 +55,14 @@ def render_video(
     """Render the person of a photo in the motion of a driver.
 
     Args:
-        source: Photo of the person.
+        source: Photo of the person, a folder of photos, or a video; or several of them, the best
+            photo first.
         driver: A video, a photo or a folder of photos of a person; or a folder of IUV images, an
             IUV image, a lossless IUV video, `.npy`, `.npz`, a detectron2 dump; or a motion such as
             `people:walk`.
         output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder of PNG.
-        source_iuv: The photo's IUV; else it is looked for beside it, and estimated where there is
-            none.
+        source_iuv: The IUV of each source; else it is looked for beside it, and estimated where
+            there is none.
         person: `largest`, an index from the left (0 first), or a box `x0,y0,x1,y1` in px.
         source_iuv_order: Channels of the source's and garments' IUV files; else found out.
         garments: Parts taken from other photos.
@@ -97,8 +98,8 @@ def render_video(
     """
     return run(
         RenderOptions(
-            source=Path(source),
-            source_iuv=_path(source_iuv),
+            source=_paths(source),
+            source_iuv=_paths(source_iuv),
             person=person,
             source_iuv_order=source_iuv_order,
             garments=tuple(garments),
@@ -131,6 +132,12 @@ def render_video(
         ),
         listener,
     )
+
+
+def _paths(paths: AnyPath | Sequence[AnyPath] | None) -> tuple[Path, ...]:
+    if paths is None:
+        return ()
+    return (Path(paths),) if isinstance(paths, str | PathLike) else tuple(map(Path, paths))
 
 
 def _path(path: AnyPath | None) -> Path | None:

@@ -20,7 +20,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Stage:
-    """A step of known length begins (`compare`, `estimate`, `scan` or `render`)."""
+    """A step of known length begins (`compare`, `estimate`, `look`, `scan` or `render`)."""
 
     name: str
     frame_count: int

@@ -10,7 +10,7 @@ that help is instant.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from functools import cache
@@ -263,8 +263,8 @@ def _unchanged(value: Any) -> Any:
     return value
 
 
-def _paths(written: tuple[str, ...]) -> tuple[Path, ...]:
-    return tuple(Path(text) for text in written)
+def _paths(written: str | Sequence[str]) -> tuple[Path, ...]:
+    return tuple(Path(text) for text in ([written] if isinstance(written, str) else written))
 
 
 PARSERS: dict[str, Callable[[Any], Any]] = {

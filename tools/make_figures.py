@@ -41,7 +41,7 @@ LABEL_PX = 44
 
 def main(assets: Path) -> None:
     options = RenderOptions(
-        source=DEMO / "source.png", driver=DEMO / "driver.mkv", output=Path("unused.mp4")
+        source=(DEMO / "source.png",), driver=DEMO / "driver.mkv", output=Path("unused.mp4")
     )
     recipe = open_recipe(options)
     source = read_source(options, recipe.texture_size)
@@ -93,7 +93,7 @@ def main(assets: Path) -> None:
 def photo_alone() -> np.ndarray:
     """What `mt demo --photo-alone` goes through."""
     options = RenderOptions(
-        source=DEMO / "astronaut.jpg", driver=DEMO / "wave.mkv", output=Path("unused.mp4")
+        source=(DEMO / "astronaut.jpg",), driver=DEMO / "wave.mkv", output=Path("unused.mp4")
     )
     driver = PreviewedDriver(open_driver(options, ROOT, ignore))
     driver.see_all(Event(), lambda _count: None)

@@ -129,16 +129,16 @@ class _Spread:
         self._real_folders: dict[str, tuple[str, bool]] = {}
         self._defaults = self._written(manifest.defaults)
 
-    def pairs(self) -> Iterator[tuple[Place, str, str, Any]]:
+    def pairs(self) -> Iterator[tuple[Place, tuple[str, ...], str, Any]]:
         """Yield where it stands, source, driver, and the entry, for each job."""
         for number, entry in enumerate(self._manifest.jobs):
             place: Place = ("jobs", number)
-            for source in self._matches((*place, "source"), [entry.source], photos=True):
+            for source in self._people((*place, "source"), [entry.source]):
                 for driver in self._matches((*place, "driver"), [entry.driver], photos=False):
                     yield place, source, driver, entry
         for number, entry in enumerate(self._manifest.matrix):
             place = ("matrix", number)
-            sources = self._matches((*place, "sources"), entry.sources, photos=True)
+            sources = self._people((*place, "sources"), entry.sources)
             drivers = self._matches((*place, "drivers"), entry.drivers, photos=False)
             if len(sources) * len(drivers) > MOST_JOBS:
                 raise ManifestError(
@@ -149,11 +149,11 @@ class _Spread:
                 yield place, source, driver, entry
 
     def options(
-        self, place: Place, source: str, driver: str, entry: Any, number: int
+        self, place: Place, source: tuple[str, ...], driver: str, entry: Any, number: int
     ) -> tuple[RenderOptions, list[_Output]]:
         """Make the options of one job, and list what it writes, the output first."""
         words = {**self._defaults, **self._written(entry), "source": source, "driver": driver}
-        names = {"source": _stem(source), "driver": name_driver(driver), "index": number}
+        names = {"source": _stem(source[0]), "driver": name_driver(driver), "index": number}
         outputs: list[_Output] = []
         for word in BELOW_ROOT:
             if words.get(word) is not None:
@@ -187,10 +187,26 @@ class _Spread:
                 for g in value
             ]
         elif OPTIONS[word].kind == "path" and word not in BELOW_ROOT:
-            named = (word, value) == ("audio", NO_AUDIO) or (word == "weights" and value in SHIPPED)
-            fixed = named or value.startswith("/") or not _names_file(value)
-            return _path(value if fixed else f"{self._folder}/{value}")
+            return self._laid(word, value)
+        elif OPTIONS[word].kind == "paths":
+            several = [value] if isinstance(value, str) else value
+            return tuple(self._laid(word, path) for path in several)
         return OPTIONS[word].read(value)
+
+    def _laid(self, word: str, value: str) -> Path:
+        named = (word, value) == ("audio", NO_AUDIO) or (word == "weights" and value in SHIPPED)
+        fixed = named or value.startswith("/") or not _names_file(value)
+        return _path(value if fixed else f"{self._folder}/{value}")
+
+    def _people(self, place: Place, written: Sequence[str | list[str]]) -> list[tuple[str, ...]]:
+        """List the photos of each person: each match is one, a list within shows one together."""
+        people: list[tuple[str, ...]] = []
+        for patterns in written:
+            if isinstance(patterns, str):
+                people += [(match,) for match in self._matches(place, [patterns], photos=True)]
+            else:
+                people.append(tuple(self._matches(place, patterns, photos=True)))
+        return people
 
     def _matches(self, place: Place, patterns: Sequence[str], *, photos: bool) -> list[str]:
         found: list[str] = []
@@ -283,7 +299,7 @@ def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
     known: set[Path] = set()
     for job in jobs:
         options = job.options
-        paths = [("source", options.source)]
+        paths = [("source", path) for path in options.source]
         paths += [("driver", path) for path in driver_files(options)]
         if options.weights is not None:
             paths.append(("weights", find_weights(options.weights)))
@@ -296,7 +312,7 @@ def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
                 continue
             known.add(path)
             try:
-                check_readable(path, what, folder=what == "driver")
+                check_readable(path, what, folder=what in ("source", "driver"))
             except InputError as error:
                 yield f"job {job.index} ({job.name}): {error}"
 

@@ -54,6 +54,7 @@ def _type_of(entry: Option) -> Any:
         "rate": str | float,
         "frames": str | int,
         "garments": list[GarmentEntry],
+        "paths": str | list[str],
     }
     return kinds.get(entry.kind, str)
 
@@ -89,6 +90,8 @@ def _required(description: str) -> Any:
 
 
 PLACEHOLDERS = "{source}, {driver}: names without their endings; {index}: counts from 1"
+Source = str | Annotated[list[str], Field(min_length=1)]
+SEVERAL = "A list within shows one person, all the matches of its globs."
 OUTPUT = _required(f"Below the output root. With globs, a template of {PLACEHOLDERS}.")
 
 Defaults = create_model(
@@ -100,7 +103,10 @@ JobEntry = create_model(
     __doc__="One run, or one for each match of a glob.",
     **{
         **_fields(),
-        "source": _required("Photo of the person; a glob means each match."),
+        "source": (
+            Source,
+            Field(description=f"As --source of `mt run`; a glob means each match. {SEVERAL}"),
+        ),
         "driver": _required("As --driver of `mt run`; a glob means each match."),
         "output": OUTPUT,
         "priority": PRIORITY,
@@ -113,7 +119,10 @@ MatrixEntry = create_model(
     __doc__="Every source with every driver.",
     **{
         **_fields(leave_out=("source", "driver")),
-        "sources": (list[str], Field(min_length=1, description="Photos; globs are allowed.")),
+        "sources": (
+            list[Source],
+            Field(min_length=1, description=f"Photos; globs are allowed. {SEVERAL}"),
+        ),
         "drivers": (list[str], Field(min_length=1, description="Drivers; globs are allowed.")),
         "output": OUTPUT,
         "priority": PRIORITY,

@@ -85,7 +85,7 @@ def _entry(job: Job, state: BatchState) -> dict[str, Any]:
         "name": job.name,
         "status": status,
         "output": os.path.relpath(output, state.report),
-        "source": str(job.options.source),
+        "source": job.options.source_words,
         "driver": str(job.options.driver),
         **{f"{k}_picture": f"{stem}-{k}.png" if has_pictures else None for k in PICTURES},
         **{key: record[key] for key in PUBLIC if record.get(key) is not None},

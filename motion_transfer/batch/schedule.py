@@ -419,7 +419,7 @@ def _facts(active: ActiveJob, status: str, seconds: float) -> dict[str, Any]:
         "output": str(options.output),
         "name": active.name,
         "status": status,
-        "source": str(options.source),
+        "source": options.source_words,
         "driver": str(options.driver),
         "seconds": round(seconds, 3),
     }

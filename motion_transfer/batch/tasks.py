@@ -232,7 +232,7 @@ def assemble(
     sheet = ContactSheet(folder, len(run.plan.frames)) if options.sheet else None
     with explain_disk_errors(options.output):
         finished = join(options, run, folder, sheet)
-    posters = write_posters(options.source, finished, pictures)
+    posters = write_posters(options.source[0], finished, pictures)
     return finished, posters
 
 

@@ -99,13 +99,13 @@ def _options_of_job(manifest: Path, number: int) -> RenderOptions:
 
 def _options_of_words(words: dict[str, Any]) -> RenderOptions:
     for name in ("source", "driver"):
-        if words[name] is None:
+        if not words[name]:
             raise InputError(f"--{name} is missing; give a source and a driver, or a manifest")
     output = words["output"]
     if not output:
         from motion_transfer.batch.expand import name_driver
 
-        output = f"{Path(words['source']).stem}_{name_driver(words['driver'])}.mp4"
+        output = f"{Path(words['source'][0]).stem}_{name_driver(words['driver'])}.mp4"
     return options_from_words(RenderOptions, {**words, "output": output})
 
 

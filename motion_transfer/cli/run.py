@@ -28,13 +28,14 @@ def run(
     as_json: bool,
     **words: Any,
 ) -> None:
-    """Render the person of a photo in the motion of a driver.
+    """Render the person of a photo, or of several, in the motion of a driver.
 
     The IUV of a photo or a video that comes without it is estimated. A run that was stopped, in
     whatever way, goes on where it was when it is started again.
 
     \b
     mt run --source photo.png --driver iuv_frames/ -o out.mp4
+    mt run --source front.jpg --source back.jpg --driver dance.mp4 -o out.mp4
     mt run --source photo.png --driver dance.mp4 --background photo --compare -o out.mp4
     mt run --source me.png --driver me_IUV.png --garment dress.png \\
            --garment-parts torso,upper-legs --background photo -o dressed.png
@@ -85,7 +86,7 @@ def demo(
     with as_file(files("motion_transfer.demo")) as folder:  # also where a package is an archive
         render(
             RenderOptions(
-                source=folder / ("astronaut.jpg" if photo_alone else "source.png"),
+                source=(folder / ("astronaut.jpg" if photo_alone else "source.png"),),
                 driver=folder / ("wave.mkv" if photo_alone else "driver.mkv"),
                 output=output,
                 compare=compare,

@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
@@ -22,6 +23,7 @@ from motion_transfer.drawing.person import (
     isolate,
     occupancy,
 )
+from motion_transfer.drawing.views import MergedViews, View, merge_views, rate_texels
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import ChannelOrder
@@ -36,6 +38,7 @@ CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up t
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
 SOLID_ALPHA = 192  # of 255; less is mixed with the background
+LEAST_RATING = 0.01  # of a view, in the units of `View.rating`
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
 
 
@@ -85,35 +88,82 @@ class Source:
 
 
 def unfold_source(
-    pictures: Sequence[SourcePicture], texture_size: int, iuv_path: Path | None = None
+    pictures: Sequence[SourcePicture],
+    texture_size: int,
+    iuv_path: Path | None = None,
+    *,
+    garments: Sequence[SourcePicture] = (),
 ) -> Source:
     """Unfold what photos show into one source.
 
     Args:
-        pictures: The person, then garments; later ones win where two give the same part.
+        pictures: The person, one photo or several; the first one leads, see `merge_views`.
         texture_size: Side of the partial texture in texels.
-        iuv_path: Where the person's IUV was read; None where it was estimated.
+        iuv_path: Where the first photo's IUV was read; None where it was estimated.
+        garments: Laid over the person; later ones win where two give the same part.
     Raises: InputError for a garment photo that shows none of its parts.
     """
-    layers = [unfold_picture(picture, texture_size) for picture in pictures]
-    for picture, (_, shown) in zip(pictures[1:], layers[1:], strict=True):
-        if picture.parts and not shown.any():
-            found = ", ".join(PART_NAMES[p] for p in np.unique(picture.iuv[..., 0]) if p)
+    merged = merge_views(unfold_views(pictures, texture_size))
+    layers = [(merged.texture, merged.visibility)]
+    layers += [unfold_picture(garment, texture_size) for garment in garments]
+    for garment, (_, shown) in zip(garments, layers[1:], strict=True):
+        if garment.parts and not shown.any():
+            found = ", ".join(PART_NAMES[p] for p in np.unique(garment.iuv[..., 0]) if p)
             raise InputError(
-                f"garment {picture.photo.path} shows none of"
-                f" {', '.join(PART_NAMES[p] for p in picture.parts)}; it shows {found}"
+                f"garment {garment.photo.path} shows none of"
+                f" {', '.join(PART_NAMES[p] for p in garment.parts)}; it shows {found}"
             )
     texture, visibility = merge_textures(layers)
-    clearances = [
-        clearance_of(picture.photo, picture.iuv, picture.parts, alpha=picture.alpha)
-        for picture in pictures
-    ]
+    clearances = [_mean_clearance(pictures), *(_clearance(garment) for garment in garments)]
     clearance = torch.cat(merge_textures([(c[:, :1], c[:, 1:]) for c in clearances]), dim=1)
     person = pictures[0]
-    notes = tuple(note for picture in pictures for note in _list_notes(picture))
+    notes = [note for picture in (*pictures, *garments) for note in _list_notes(picture)]
+    notes += tell_strangers(pictures, merged)
     return Source(
-        person.photo, person.iuv, iuv_path, texture, visibility, person.alpha, clearance, notes
+        person.photo,
+        person.iuv,
+        iuv_path,
+        texture,
+        visibility,
+        person.alpha,
+        clearance,
+        tuple(dict.fromkeys(notes)),  # those of a video are the same for each of its frames
     )
+
+
+def unfold_views(pictures: Sequence[SourcePicture], texture_size: int) -> list[View]:
+    """Unfold each photo of a person, and rate how well it sees each texel."""
+    views = []
+    for picture in pictures:
+        texture, visibility = unfold_picture(picture, texture_size)
+        if len(pictures) == 1:  # nothing to compare with
+            return [View(str(picture.photo.path), texture, visibility, visibility)]
+        rating = rate_texels(picture.photo.rgb, picture.iuv)
+        fine = F.interpolate(rating, (texture_size, texture_size), mode="bilinear")
+        # seen at all is more than not seen, also where few pixels fall
+        rating = fine.clamp_min(LEAST_RATING) * visibility
+        views.append(View(str(picture.photo.path), texture, visibility, rating))
+    return views
+
+
+def tell_strangers(pictures: Sequence[SourcePicture], merged: MergedViews) -> list[str]:
+    """Say which photos do not seem to show the person of the first."""
+    return [
+        f"{pictures[index].photo.path} seems to show somebody else than {pictures[0].photo.path},"
+        " or other clothes; leave it out if it does"
+        for index in merged.strangers
+    ]
+
+
+def _clearance(picture: SourcePicture) -> Float[Tensor, "1 2 128 128"]:
+    return clearance_of(picture.photo, picture.iuv, picture.parts, alpha=picture.alpha)
+
+
+def _mean_clearance(pictures: Sequence[SourcePicture]) -> Float[Tensor, "1 2 128 128"]:
+    """The mean of what each photo measures along its own outline."""
+    lengths, known = torch.stack([_clearance(picture) for picture in pictures]).split(1, dim=2)
+    count = known.sum(0)
+    return torch.cat([(lengths * known).sum(0) / count.clamp_min(1), count.clamp_max(1)], dim=1)
 
 
 def _list_notes(picture: SourcePicture) -> list[str]:

@@ -91,7 +91,7 @@ def estimate_clip(
     """
     summary = summary if summary is not None else ClipSummary()
     chosen = chosen or range(pictures.frame_count)
-    seen = _follow(pictures, estimator, person, chosen)
+    seen = follow_people(pictures, estimator, person, chosen)
     frames = _draw(pictures, seen, summary, fail=missing == "fail", with_alpha=with_alpha)
     with closing(read_ahead(frames, AHEAD_FRAMES)) as ahead:
         yield from fill_gaps(ahead, "hold") if missing == "hold" else ahead
@@ -116,7 +116,7 @@ def follow_landmarks(
     Raises: InputError if nobody is found in any of them, or for a frame that is broken.
     """
     found: list[Landmarks] = []
-    with closing(_follow(pictures, estimator, person, chosen)) as frames:
+    with closing(follow_people(pictures, estimator, person, chosen)) as frames:
         for seen in frames:
             found += [one.landmarks for one in seen.people[:1] if one.landmarks is not None]
             if seen.is_chosen:
@@ -171,8 +171,13 @@ def _touch(one: Box, other: Box) -> bool:
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """A frame and its chosen people; nobody before the first chosen frame."""
+class SeenPicture:
+    """A frame of raw pictures, and whom of its people was meant.
+
+    Attributes:
+        is_chosen: Whether it is one of the chosen frames; before them, nobody is looked for.
+        begins: Whether a shot begins here.
+    """
 
     index: int
     picture: Frame
@@ -181,15 +186,21 @@ class _Seen:
     people: list[PersonEstimate]
 
 
-def _follow(
+def follow_people(
     pictures: PictureStream, estimator: Estimator, person: str, chosen: range
-) -> Generator[_Seen, None, None]:
+) -> Generator[SeenPicture, None, None]:
+    """Find the people of every frame up to the last chosen one, and follow those that are meant.
+
+    Args:
+        person: As that of `estimate_clip`.
+    Raises: InputError for a frame that is broken, or if the choice means nobody.
+    """
     follower = Follower(person)
     marked = mark_shots(islice(pictures.read(), chosen.stop))
     with closing(read_ahead(marked, AHEAD_FRAMES)) as frames:
         for index, (picture, begins) in enumerate(frames):
             if index < chosen.start:
-                yield _Seen(index, picture, False, False, [])
+                yield SeenPicture(index, picture, False, False, [])
                 continue
             # the first frame that is looked at has no past, wherever its shot began
             begins = begins or index == chosen.start
@@ -197,12 +208,12 @@ def _follow(
                 estimator.start_shot()
                 follower.start_shot()
             people = follower.pick(estimator.estimate(picture), pictures.where(index))
-            yield _Seen(index, picture, True, begins, people)
+            yield SeenPicture(index, picture, True, begins, people)
 
 
 def _draw(
     pictures: PictureStream,
-    frames: Generator[_Seen, None, None],
+    frames: Generator[SeenPicture, None, None],
     summary: ClipSummary,
     *,
     fail: bool,

@@ -28,6 +28,8 @@ def command_line(options: RenderOptions) -> str:
             for garment in value:
                 iuv = f",{garment.iuv}" if garment.iuv else ""
                 words += [flag, f"{garment.photo}{iuv}", entry.flags[1], _parts(garment)]
+        elif entry.kind == "paths":
+            words += [word for path in value for word in (flag, str(path))]
         elif entry.kind == "flag":
             words.append(flag)
         elif entry.kind == "switch":
@@ -76,12 +78,19 @@ def _manifest_value(entry: Option, value: Any, folder: Path) -> Any:
             for garment in value
         ]
     if entry.kind == "path":
-        if (entry.name, str(value)) in NAMES or not names_file(value):
-            return str(value)
-        path = _below(value, folder)
-        # marks of a glob in a file's name are to mean themselves
-        return glob.escape(path) if entry.name in ("source", "driver") else path
+        return _manifest_path(entry, value, folder)
+    if entry.kind == "paths":
+        paths = [_manifest_path(entry, path, folder) for path in value]
+        return paths if len(paths) > 1 else paths[0]
     return value if entry.kind in ("flag", "switch", "integer") else _text(entry, value)
+
+
+def _manifest_path(entry: Option, value: Path, folder: Path) -> str:
+    if (entry.name, str(value)) in NAMES or not names_file(value):
+        return str(value)
+    path = _below(value, folder)
+    # marks of a glob in a file's name are to mean themselves
+    return glob.escape(path) if entry.name in ("source", "driver") else path
 
 
 def _text(entry: Option, value: Any) -> str:

@@ -274,7 +274,7 @@ class Session:
                 },
                 "source": source
                 and {
-                    "name": options.source.name,
+                    "name": ", ".join(path.name for path in options.source),
                     "width": source.photo.rgb.shape[1],
                     "height": source.photo.rgb.shape[0],
                 },

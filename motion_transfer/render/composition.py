@@ -89,7 +89,7 @@ def compose(
     plan = plan_run(options, scan)
     inputs = Inputs(appearance_files(options))
     recipe = open_recipe(options)
-    source = read_source(options, recipe.texture_size)
+    source = read_source(options, recipe.texture_size, listener)
     for note in source.notes:
         listener(Notice(note))
     prepared = prepare_run(options, scan, plan, recipe, source, inputs, listener)
@@ -188,7 +188,9 @@ def prepare_run(
 
 def is_in_place(options: RenderOptions, source: Source) -> bool:
     """Tell whether the driver is the source itself, or its IUV: its surroundings then stay."""
-    photo, iuv = options.source.resolve(), source.iuv_path and source.iuv_path.resolve()
+    if len(options.source) != 1:
+        return False
+    photo, iuv = options.source[0].resolve(), source.iuv_path and source.iuv_path.resolve()
     return options.driver.resolve() in (photo, iuv)
 
 

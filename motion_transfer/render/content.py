@@ -7,9 +7,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from motion_transfer.estimate.opening import estimator_facts
-from motion_transfer.media.iuv.formats import find_iuv_of
 from motion_transfer.media.work import digest_file, key_of
 from motion_transfer.option import list_options
+from motion_transfer.render.inputs import find_source_iuv, has_own_iuv
 from motion_transfer.render.options import (
     EstimatorOptions,
     InputOptions,
@@ -38,13 +38,16 @@ KEYED_ELSEWHERE = {
 
 def source_key(options: SourceOptions, recipe: Recipe) -> str:
     """Compute the key of a source's appearance. Raises: InputError for a file that is missing."""
-    files = [("source", options.source, options.source_iuv)]
+    files = [("source", source, iuv) for source, iuv in options.sources]
     files += [("garment", garment.photo, garment.iuv) for garment in options.garments]
     content = []
     for what, photo, given in files:
-        iuv = given or find_iuv_of(photo)
+        iuv = given or find_source_iuv(photo)
         content.append(digest_file(photo, what))
-        content.append(digest_file(iuv, what) if iuv else _estimator_facts(options))
+        if iuv:
+            content.append(digest_file(iuv, what))
+        elif not has_own_iuv(photo):
+            content.append(_estimator_facts(options))
     return key_of(
         {
             "content": content,
@@ -113,9 +116,10 @@ def driver_key(options: InputOptions) -> str:
 
 def _fit_facts(options: SourceOptions) -> dict[str, Any]:
     """List what decides whose proportions a driver gets."""
-    iuv = options.source_iuv or find_iuv_of(options.source)
+    source, iuv = options.sources[0]
+    iuv = iuv or find_source_iuv(source)
     return {
-        "source": digest_file(options.source, "source"),
+        "source": digest_file(source, "source"),
         "iuv": digest_file(iuv, "source") if iuv else None,
         "order": options.source_iuv_order,
         "person": options.person,

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from motion_transfer.media.iuv.formats import list_iuv_names, names_file
+from motion_transfer.media.iuv.formats import (
+    find_iuv_of,
+    list_clip_iuv_names,
+    list_iuv_names,
+    names_file,
+)
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, list_photos
 from motion_transfer.render.options import (
     NO_AUDIO,
     DriverOptions,
@@ -29,11 +35,45 @@ def appearance_files(options: RenderOptions) -> Iterator[Path]:
 
 def photo_files(options: SourceOptions) -> Iterator[Path]:
     """List the photos of a source with their IUV; all names by which IUV would be found."""
-    photos = [(options.source, options.source_iuv)]
-    photos += [(garment.photo, garment.iuv) for garment in options.garments]
+    photos = [*options.sources, *((garment.photo, garment.iuv) for garment in options.garments)]
     for photo, given in photos:
         yield photo
-        yield from [given] if given else list_iuv_names(photo)
+        yield from [given] if given else iuv_names(photo)
+
+
+def is_clip(source: Path) -> bool:
+    """Tell whether a source is a video or a folder, and no single photo."""
+    return source.is_dir() or source.suffix.lower() not in PHOTO_SUFFIXES
+
+
+def iuv_names(source: Path) -> list[Path]:
+    """List where the IUV of a source is looked for."""
+    return list_clip_iuv_names(source) if is_clip(source) else list_iuv_names(source)
+
+
+def find_source_iuv(source: Path) -> Path | None:
+    """Find the IUV beside a source; None where it is estimated, or where photos have their own.
+
+    Raises: InputError if there is no such source.
+    """
+    if is_clip(source):
+        return next((name for name in list_clip_iuv_names(source) if name.exists()), None)
+    return find_iuv_of(source)
+
+
+def has_own_iuv(source: Path) -> bool:
+    """Tell whether a source is a folder in which the IUV of every photo lies beside it."""
+    if not source.is_dir():
+        return False
+    photos = list_source_photos(source)
+    return all(any(name.exists() for name in list_iuv_names(photo)) for photo in photos)
+
+
+def list_source_photos(folder: Path) -> list[Path]:
+    """List the photos of a folder, without their IUV. Raises: InputError if there are none."""
+    photos = list_photos(folder)
+    iuv = {name for photo in photos for name in list_iuv_names(photo)}
+    return [photo for photo in photos if photo not in iuv]
 
 
 def model_files(options: EstimatorOptions) -> Iterator[Path]:

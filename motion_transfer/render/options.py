@@ -89,16 +89,28 @@ class EstimatorOptions(_Part):
 
 @dataclass(frozen=True, kw_only=True)
 class SourceOptions(EstimatorOptions):
-    """Who is drawn, and in whose clothes."""
+    """Who is drawn, and in whose clothes.
 
-    source: Path = option(
-        "--source", "Source", "Photo of the person.", kind="path", default=REQUIRED
+    Several sources show one person; `source_iuv` then is empty or has one for each.
+    """
+
+    source: tuple[Path, ...] = option(
+        "--source",
+        "Source",
+        "Photo of the person, a folder of photos, or a video; may be repeated, the best photo"
+        " first; or what `mt source save` kept.",
+        kind="paths",
+        default=REQUIRED,
+        metavar="PATH",
     )
-    source_iuv: Path | None = option(
+    source_iuv: tuple[Path, ...] = option(
         "--source-iuv",
         "Source",
-        "Its IUV; else STEM_IUV.png or STEM_iuv.png beside it; else it is estimated.",
-        kind="path",
+        "Its IUV, one for each source; else STEM_IUV.png or STEM_iuv.png beside it (of videos and"
+        " folders STEM_IUV.mkv or STEM_iuv/); else it is estimated.",
+        kind="paths",
+        default=(),
+        metavar="PATH",
     )
     person: str = option(
         "--person",
@@ -122,6 +134,26 @@ class SourceOptions(EstimatorOptions):
         default=(),
         parse=lambda written: tuple(map(read_garment, written)),
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.source:
+            raise InputError("no source; give a photo of the person with --source")
+        if self.source_iuv and len(self.source_iuv) != len(self.source):
+            raise InputError(
+                f"{len(self.source_iuv)} source IUV for {len(self.source)} sources; give one for"
+                " each, in their order, or none"
+            )
+
+    @property
+    def sources(self) -> list[tuple[Path, Path | None]]:
+        """Each source with the IUV that was named for it, if any was."""
+        return list(zip(self.source, self.source_iuv or [None] * len(self.source), strict=True))
+
+    @property
+    def source_words(self) -> str:
+        """The sources, for messages."""
+        return ", ".join(map(str, self.source))
 
 
 @dataclass(frozen=True, kw_only=True)

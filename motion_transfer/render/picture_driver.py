@@ -35,6 +35,7 @@ from motion_transfer.media.publish import publish
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.media.work import digest_of
 from motion_transfer.render.content import driver_key
+from motion_transfer.render.inputs import is_clip
 from motion_transfer.render.options import InputOptions, SourceOptions
 from motion_transfer.render.plan import frame_range
 
@@ -152,9 +153,15 @@ def _match_body(
 
 
 def _source_landmarks(options: SourceOptions) -> Landmarks:
-    """Find the landmarks of the source's person, also where its IUV says who that is."""
-    photo = read_photo(options.source)
-    iuv_path = options.source_iuv or find_iuv_of(options.source)
+    """Find the landmarks of the first source's person, also where its IUV says who that is."""
+    path, iuv_path = options.sources[0]
+    if is_clip(path):
+        raise InputError(
+            f"--fit-body measures a photo, and the source {path} is a folder or a video; name a"
+            " photo first, or leave out --fit-body"
+        )
+    photo = read_photo(path)
+    iuv_path = iuv_path or find_iuv_of(path)
     choice = options.person
     if iuv_path is not None:
         iuv = read_person(photo, iuv_path, choice, options.source_iuv_order, "source")
@@ -163,10 +170,10 @@ def _source_landmarks(options: SourceOptions) -> Landmarks:
             choice = f"{box.left},{box.top},{box.right},{box.bottom}"
     estimator = open_estimator(options.estimator, options.estimator_model)
     people = estimator.estimate(photo.on_white())
-    chosen = Follower[PersonEstimate](choice).pick(people, f"source {options.source}")
+    chosen = Follower[PersonEstimate](choice).pick(people, f"source {path}")
     if not chosen or chosen[0].landmarks is None:
         raise InputError(
-            f"--fit-body: no landmarks of a person were found in the source {options.source}; give"
+            f"--fit-body: no landmarks of a person were found in the source {path}; give"
             " a photo that shows one, or leave out --fit-body"
         )
     return chosen[0].landmarks

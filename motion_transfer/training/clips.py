@@ -8,7 +8,7 @@ from pathlib import Path
 
 from motion_transfer.drawing.person import choose_person, find_people, isolate
 from motion_transfer.errors import InputError
-from motion_transfer.media.iuv.formats import ChannelOrder, iuv_suffixes
+from motion_transfer.media.iuv.formats import ChannelOrder, list_clip_iuv_names
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.pictures.formats import VIDEO_SUFFIXES
@@ -146,12 +146,7 @@ def choose_frames(frame_count: int, moments: int) -> Sequence[int]:
 
 
 def _open_clip(path: Path, order: ChannelOrder | None) -> Clip:
-    beside = [
-        path.with_name(f"{path.stem}{ending}{suffix}")
-        for ending in IUV_ENDINGS
-        for suffix in (*iuv_suffixes(several=True), "")  # the last: a folder
-    ]
-    iuv_path = next((candidate for candidate in beside if candidate.exists()), None)
+    iuv_path = next((name for name in list_clip_iuv_names(path) if name.exists()), None)
     if iuv_path is None:
         raise InputError(
             f"no IUV beside it; expected {path.stem}_iuv/, {path.stem}_IUV.mkv or .npz"

@@ -179,7 +179,7 @@ def test_the_preview_of_a_clip_shows_its_pictures(tmp_path: Path) -> None:
 
     clip = film_of_the_astronaut(tmp_path / "clip.mp4", 5)
     options = RenderOptions(
-        source=ASTRONAUT, driver=clip, output=tmp_path / "out.mp4", renderer="texture"
+        source=(ASTRONAUT,), driver=clip, output=tmp_path / "out.mp4", renderer="texture"
     )
     session = Session(options, tmp_path / "job.yaml")
     try:

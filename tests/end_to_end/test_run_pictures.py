@@ -207,7 +207,7 @@ def test_shots_have_their_own_windows(tmp_path: Path, red: dict, me: Path, size:
 
 
 def test_the_source_ends_where_alpha_does(red_model: Path, me: Path) -> None:
-    options = SourceOptions(source=me, estimator="densepose", estimator_model=red_model)
+    options = SourceOptions(source=(me,), estimator="densepose", estimator_model=red_model)
     source = read_source(options, 64)
     assert source.alpha is not None and source.iuv_path is None
     colours = source.texture[0].permute(1, 2, 0)[source.visibility[0, 0] > 0].numpy()

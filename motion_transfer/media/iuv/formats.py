@@ -162,6 +162,19 @@ def list_iuv_names(photo: Path) -> list[Path]:
     return [photo.with_name(f"{photo.stem}_{word}.png") for word in ("IUV", "iuv")]
 
 
+def list_clip_iuv_names(clip: Path) -> list[Path]:
+    """List where the IUV of a video, or of a folder of photos, is looked for, all beside it.
+
+    It is `STEM_IUV.mkv` or `STEM_iuv.mkv`, another file that holds the IUV of many frames, or a
+    folder `STEM_IUV` or `STEM_iuv`.
+    """
+    return [
+        clip.with_name(f"{clip.stem}_{word}{suffix}")
+        for word in ("IUV", "iuv")
+        for suffix in (*iuv_suffixes(several=True), "")
+    ]
+
+
 def find_iuv_of(photo: Path) -> Path | None:
     """Find the IUV that lies beside a photo; None means that it has to be estimated.
 

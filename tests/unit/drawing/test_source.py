@@ -29,7 +29,7 @@ RED, GREEN, YELLOW = (200, 40, 40), (40, 160, 60), (220, 180, 40)
 
 
 def prepare(photo: Path, **changes) -> Source:
-    return read_source(SourceOptions(source=photo, **changes), SIZE)
+    return read_source(SourceOptions(source=(photo,), **changes), SIZE)
 
 
 def colour_of(source: Source, parts: tuple[int, ...]) -> list[int] | None:
@@ -103,7 +103,7 @@ def test_the_iuv_is_found_beside_the_photo(studio, word: str) -> None:
 def test_a_named_iuv_is_taken(studio) -> None:
     photo = studio.source()
     other = (studio.folder / "person_IUV.png").rename(studio.folder / "other.png")
-    assert prepare(photo, source_iuv=other).iuv_path == other
+    assert prepare(photo, source_iuv=(other,)).iuv_path == other
     with pytest.raises(InputError, match=r"neither person_IUV\.png nor person_iuv\.png is beside"):
         prepare(photo)
 

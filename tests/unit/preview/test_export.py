@@ -66,7 +66,7 @@ def test_the_manifest_means_the_same(
 
 def test_paths_below_the_manifest_can_move_with_it(tmp_path: Path) -> None:
     text = manifest_text(
-        options(source=tmp_path / "a.png", driver=Path("/else/d"), output=tmp_path / "o/b.mp4"),
+        options(source=(tmp_path / "a.png",), driver=Path("/else/d"), output=tmp_path / "o/b.mp4"),
         tmp_path / "job.yaml",
     )
     assert "source: a.png" in text
@@ -78,7 +78,7 @@ def test_paths_below_the_manifest_can_move_with_it(tmp_path: Path) -> None:
 def test_marks_of_globs_and_templates_in_names_are_only_names(tmp_path: Path) -> None:
     source = tmp_path / "me [1]*.png"
     source.touch()
-    written = options(source=source, driver=Path("people:walk"), output=tmp_path / "{x}.mp4")
+    written = options(source=(source,), driver=Path("people:walk"), output=tmp_path / "{x}.mp4")
     path = tmp_path / "job.yaml"
     path.write_text(manifest_text(written, path))
     (job,) = expand(*read_manifest(path))

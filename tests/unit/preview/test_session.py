@@ -32,7 +32,7 @@ COUNT = 40
 @pytest.fixture
 def options(studio, tmp_path: Path) -> RenderOptions:
     return RenderOptions(
-        source=studio.source(),
+        source=(studio.source(),),
         driver=studio.driver(COUNT),
         output=tmp_path / "out",
         renderer="texture",
@@ -352,7 +352,7 @@ def test_somebody_only_between_the_sampled_frames_is_found(studio, options, open
 
 
 def test_a_source_that_is_none_is_said_in_words(options: RenderOptions, open_session) -> None:
-    session = open_session(replace(options, source=options.source.with_name("gone.png")))
+    session = open_session(replace(options, source=(options.source[0].with_name("gone.png"),)))
     wait_for(lambda: session.error is not None)
     assert "gone.png does not exist" in session.state()["error"]
 

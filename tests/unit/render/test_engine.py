@@ -61,7 +61,7 @@ class Slow:
 @pytest.fixture
 def prepared(studio) -> Prepared:
     options = RenderOptions(
-        source=studio.source(),
+        source=(studio.source(),),
         driver=studio.array(FRAMES),
         output=studio.folder / "out.mkv",
         renderer="texture",

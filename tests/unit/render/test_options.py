@@ -91,7 +91,7 @@ def test_bad_parts(text: str, reason: str) -> None:
 
 
 def options(**changes) -> RenderOptions:
-    return RenderOptions(source=Path("a"), driver=Path("b"), output=Path("c"), **changes)
+    return RenderOptions(source=(Path("a"),), driver=Path("b"), output=Path("c"), **changes)
 
 
 @pytest.mark.parametrize(

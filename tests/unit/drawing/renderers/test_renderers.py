@@ -24,7 +24,7 @@ from motion_transfer.weights.checkpoint import load_checkpoint
 
 @pytest.fixture
 def source(studio) -> Source:
-    return read_source(SourceOptions(source=studio.source()), 64)
+    return read_source(SourceOptions(source=(studio.source(),)), 64)
 
 
 @pytest.fixture(params=["texture", "nhrr"])
