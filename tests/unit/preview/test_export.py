@@ -21,7 +21,8 @@ CHANGES = [
     {"frames": (3, None), "frame_rate": Fraction(30000, 1001), "window": "-4,5,300"},
     {"frames": (None, 9), "compile": True, "compare": True, "crf": 20, "codec": "h265"},
     {"compile": False, "size": "crop", "audio": Path("none"), "weights": Path("lite")},
-    {"source_iuv": Path("in/a b_IUV.png"), "source_iuv_order": "vui", "missing": "hold"},
+    {"source_iuv": (Path("in/a b_IUV.png"),), "source_iuv_order": "vui", "missing": "hold"},
+    {"source": (Path("in/front.png"), Path("in/me turning.mp4"))},
     {"sheet": Path("out/sheet.png"), "estimator": "densepose", "estimator_model": Path("m.onnx")},
     {
         "garments": (
@@ -34,7 +35,7 @@ CHANGES = [
 
 def options(**changes) -> RenderOptions:
     given = {
-        "source": Path("in/it's me.png"),
+        "source": (Path("in/it's me.png"),),
         "driver": Path("in/dance"),
         "output": Path("out/a.mp4"),
     }
@@ -90,6 +91,8 @@ def _absolute(options: RenderOptions) -> dict:
     for name, value in words.items():
         if isinstance(value, Path) and str(value) not in ("none", "lite"):
             words[name] = value.absolute()
+    for name in ("source", "source_iuv"):
+        words[name] = tuple(path.absolute() for path in words[name])
     words["garments"] = [
         (g.photo.absolute(), g.iuv and g.iuv.absolute(), g.parts) for g in options.garments
     ]

@@ -142,7 +142,7 @@ def test_a_file_that_changes_is_named_on_the_page(
     session.wait_for_plan()
     session.ask_frame(8, "result", session.key).result()
     revision = session.state()["revision"]
-    folder = options.driver if name.startswith("frame") else options.source.parent
+    folder = options.driver if name.startswith("frame") else options.source[0].parent
     (folder / name).write_bytes((options.driver / "frame_1_IUV.png").read_bytes())
     time.sleep(0.2)  # it looks again and again, but not all the time
     with pytest.raises(InputError, match=f"{name} has changed since"):
@@ -304,7 +304,7 @@ def test_a_stopped_run_leaves_nothing_under_the_final_name(
 def test_a_run_that_fails_says_why(options: RenderOptions, open_session) -> None:
     session = open_session(options)
     session.wait_for_plan()
-    options.source.unlink()
+    options.source[0].unlink()
     session.render(replace_output=False)
     wait_for(lambda: session.rendering.progress.status != "running")
     assert session.rendering.progress.status == "failed"
