@@ -33,6 +33,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from motion_transfer.errors import InputError, MotionTransferError, OutputError
 from motion_transfer.media.structured import parse_json
 from motion_transfer.option import read_whole
+from motion_transfer.preview.dropped import MOST_FILE_BYTES
 from motion_transfer.preview.queue import StaleError
 
 if TYPE_CHECKING:
@@ -117,14 +118,17 @@ class Guard:
         if not all(ONE_RANGE.fullmatch(each) for each in headers.getlist("range")):
             return 416, "only one range of bytes is sent at once"
         if scope["method"] == "POST":
-            # no form of another page can send this type without asking first
-            if headers.get("content-type", "").split(";")[0].strip() != "application/json":
-                return 415, "the body has to be application/json"
+            # no form of another page can send these types without asking first
+            is_file = scope["path"].split("/")[2:3] == ["sources"]
+            wanted = "application/octet-stream" if is_file else "application/json"
+            most = MOST_FILE_BYTES if is_file else MOST_BODY_BYTES
+            if headers.get("content-type", "").split(";")[0].strip() != wanted:
+                return 415, f"the body has to be {wanted}"
             length = headers.get("content-length", "")
             if not re.fullmatch("[0-9]+", length):
                 return 411, "the length of the body has to be told"
-            if len(length) > 9 or int(length) > MOST_BODY_BYTES:
-                return 413, f"the body is larger than {MOST_BODY_BYTES} bytes"
+            if len(length) > 9 or int(length) > most:
+                return 413, f"the body is larger than {most} bytes"
         return None
 
 
@@ -195,7 +199,10 @@ def make_app(session: Future[Session], token: str, closing: Callable[[], bool]) 
         Route("/events", handlers.events),
         Route("/frame/{index}/{view}", handlers.frame),
         Route("/still/{view}", handlers.still),
+        Route("/source/{number}", handlers.source_picture),
         Route("/options", handlers.options, methods=["POST"]),
+        Route("/source", handlers.choose_sources, methods=["POST"]),
+        Route("/sources/{drop}/{name}", handlers.receive, methods=["POST"]),
         Route("/render", handlers.render, methods=["POST"]),
         Route("/render/stop", handlers.stop, methods=["POST"]),
         Route("/job", handlers.job, methods=["POST"]),
@@ -264,6 +271,37 @@ class _Handlers:
         """Send a view of the source."""
         future = (await self._session()).ask_still(request.path_params["view"])
         return await self._picture(request, future)
+
+    async def source_picture(self, request: Request) -> Response:
+        """Send one of the source's pictures."""
+        try:
+            number = read_whole(request.path_params["number"])
+        except ValueError:
+            raise HTTPException(404, "there is no such picture") from None
+        small = request.query_params.get("small") == "1"
+        future = (await self._session()).ask_source_picture(number, small=small)
+        return await self._picture(request, future)
+
+    async def receive(self, request: Request) -> Response:
+        """Write a dropped file, and give the number by which it can be chosen as a source."""
+        session, words = await self._session(), request.path_params
+        with await run_in_threadpool(session.dropped.begin, words["drop"], words["name"]) as upload:
+            async for data in request.stream():
+                await run_in_threadpool(upload.write, data)
+            path = await run_in_threadpool(upload.finish)
+        return JSONResponse({"number": session.know_source(path)})
+
+    async def choose_sources(self, request: Request) -> Response:
+        """Take some of the known sources, the one that leads first; as before if one is unfit."""
+        numbers = (await _body(request)).get("numbers")
+        if not isinstance(numbers, list) or any(type(number) is not int for number in numbers):
+            raise InputError("numbers of sources are expected")
+        session = await self._session()
+        try:
+            await run_in_threadpool(session.choose_sources, numbers)
+        except (CancelledError, asyncio.CancelledError):  # by the server's end, before the queue's
+            raise HTTPException(503, "the preview is closing") from None
+        return JSONResponse(await run_in_threadpool(session.state))
 
     async def _picture(self, request: Request, future: Future[bytes]) -> Response:
         waiting = asyncio.wrap_future(future)

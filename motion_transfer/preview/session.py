@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -25,14 +25,28 @@ from motion_transfer.media.publish import check_destination, publish, work_folde
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.option import list_options
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
+from motion_transfer.preview.dropped import DroppedFiles
 from motion_transfer.preview.export import command_line, manifest_text
 from motion_transfer.preview.queue import ByteCache, DrawQueue, StaleError
 from motion_transfer.preview.rendering import Rendering, explain
-from motion_transfer.preview.views import Views, count_people, read_proxy, write_proxies
+from motion_transfer.preview.views import (
+    Views,
+    count_people,
+    first_picture,
+    read_proxy,
+    shrink,
+    write_proxies,
+)
 from motion_transfer.render.composition import frame_size
 from motion_transfer.render.driver import open_driver
-from motion_transfer.render.inputs import appearance_files
-from motion_transfer.render.options import DEFAULT_RATE, RenderOptions, parse_window
+from motion_transfer.render.inputs import (
+    appearance_files,
+    find_source_iuv,
+    is_clip,
+    iuv_names,
+    photo_files,
+)
+from motion_transfer.render.options import DEFAULT_RATE, RenderOptions, is_kept, parse_window
 
 CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's
 SHOWN_AS_IS = ("renderer", "background", "person", "driver_person")
@@ -60,7 +74,12 @@ class Session:
         self.source: Source | None = None
         self.source_people = 0
         self.rendering = Rendering(self._touch)
-        self.views = Views()
+        self.views = Views(self._hear_source)
+        self.dropped = DroppedFiles(job_file)
+        self._known = list(options.sources)
+        self._numbers = list(range(len(self._known)))
+        self._named: set[Path] = set()
+        self._source_work: dict[str, Any] | None = None
         self._inputs = Inputs()
         self._notices: list[str] = []
         self._errors: dict[str, str] = {}
@@ -81,6 +100,8 @@ class Session:
         self._queue.close()
         self._opener.join()
         self._folder.cleanup()
+        # the command that the page shows, and that somebody has copied, names the present ones
+        self.dropped.clean(self._named | set(photo_files(self.options)))
 
     @property
     def error(self) -> str | None:
@@ -99,7 +120,7 @@ class Session:
     def key(self) -> str:
         """A digest of what pictures of frames depend on: it changes whenever one of them would."""
         o, plans = self.options, self.plans
-        drawn = (o.renderer, o.background, o.person, o.driver_person)
+        drawn = (o.renderer, o.background, o.sources, o.person, o.driver_person)
         planned = plans and (plans.shots, plans.exact, plans.chosen)
         return hashlib.sha256(repr((drawn, planned)).encode()).hexdigest()[:12]
 
@@ -141,7 +162,30 @@ class Session:
         }
         if view not in calls:
             raise InputError(f"view {view!r}; supported are {', '.join(calls)}")
-        return self._ask((options.renderer, options.person, view), calls[view], view)
+        return self._ask(
+            (options.renderer, options.sources, options.person, view), calls[view], view
+        )
+
+    def ask_source_picture(self, number: int, *, small: bool = False) -> Future[bytes]:
+        """Ask for a picture of a known source, small for the list of them; see `ask_frame`.
+
+        The source that leads shows what is taken from it; of others that are clips it is the first
+        picture.
+        """
+        with self._lock:
+            if not 0 <= number < len(self._known):
+                raise InputError(f"there is no source {number}")
+            options, leads = self.options, number == self._numbers[0]
+            path, _ = self._known[number]
+
+        def call() -> UInt8[np.ndarray, "H W 3"]:
+            if (leads and is_clip(path)) or is_kept(path):
+                shown = self.views.source(draft_of(options)).photo.on_white()
+            else:
+                shown = first_picture(path)
+            return shrink(shown) if small else shown
+
+        return self._ask((number, leads, options.person, small), call, "source")
 
     def _ask(
         self,
@@ -216,6 +260,60 @@ class Session:
                 self._errors.pop("source", None)
         self._touch()
 
+    def know_source(self, path: Path) -> int:
+        """Take a dropped file as one that can be chosen; returns its number."""
+        with self._lock:
+            self._known.append((path, None))
+            return len(self._known) - 1
+
+    def choose_sources(self, numbers: Sequence[int]) -> None:
+        """Take some of the known sources, the one that leads first; IUV among them is no source.
+
+        Raises: InputError for one that does not exist or shows nobody; all stays as it was then.
+        """
+        with self._lock:
+            if not numbers or not all(0 <= number < len(self._known) for number in numbers):
+                raise InputError("no such source; choose one at least of those that are there")
+            known = {number: self._known[number] for number in numbers}
+        if self.options.fit_body:
+            raise InputError(
+                "the driver was fitted to the body of this source; start again with another"
+                " --source, or without --fit-body"
+            )
+        iuv = {name for path, _ in known.values() for name in iuv_names(path)}
+        known = {number: each for number, each in known.items() if each[0] not in iuv}
+        paths, named = zip(*known.values(), strict=True)
+        if any(named) and not all(named):
+            named = tuple(given or find_source_iuv(path) for path, given in known.values())
+            if not all(named):
+                raise InputError(
+                    "the IUV of one source was named, and there is none of another; drop that of"
+                    f" {paths[named.index(None)].name} together with it, called STEM_IUV.png, or"
+                    " start again without --source-iuv"
+                )
+        changes: dict[str, Any] = {"source": paths, "source_iuv": named if all(named) else ()}
+        if paths[0] != self.options.source[0]:
+            changes["person"] = "largest"  # another photo's people are others
+        changed = replace(self.options, **changes)
+        inputs = Inputs(appearance_files(changed))
+
+        def read() -> tuple[Source, int]:
+            source = self.views.source(draft_of(changed))
+            return source, count_people(source, changed)
+
+        try:
+            source, people = self._queue.ask(read).result()
+        finally:
+            self._source_work = None
+            self._touch()
+        with self._lock:  # other options may have changed meanwhile
+            self.options = replace(self.options, **changes)
+            self._inputs, self._numbers = inputs, list(known)
+            self.source, self.source_people = source, people
+            for cause in ("source", "inputs"):
+                self._errors.pop(cause, None)
+        self._touch()
+
     def _check_inputs(self, driver: PreviewedDriver) -> None:
         """Raise InputError if a file is not what it was; from then on the page says so."""
         try:
@@ -232,6 +330,7 @@ class Session:
         """Begin the real run. Raises: OutputError if its output is in the way."""
         options = replace(self.options, force=self.options.force or replace_output)
         check_destination(options.output, force=options.force)
+        self._named.update(photo_files(options))  # a stopped run goes on from them
         if not self.rendering.begin(options):
             raise InputError("a run is under way; stop it, or wait until it is done")
 
@@ -246,6 +345,7 @@ class Session:
             written = folder / self.job_file.name
             written.write_text(text, encoding="utf-8")
             publish(written, self.job_file)
+        self._named.update(photo_files(self.options))
         return text
 
     def state(self) -> dict[str, Any]:
@@ -272,9 +372,15 @@ class Session:
                     "person": _whom(self.source_people, options.person),
                     "driver_person": _whom(in_driver, options.driver_person),
                 },
+                "sources": [
+                    {"number": number, "name": self._known[number][0].name}
+                    for number in self._numbers
+                ],
+                "dropped_in": str(self.dropped.folder),
+                "source_work": self._source_work,
                 "source": source
                 and {
-                    "name": ", ".join(path.name for path in options.source),
+                    "name": _name_some([path.name for path in options.source]),
                     "width": source.photo.rgb.shape[1],
                     "height": source.photo.rgb.shape[0],
                 },
@@ -296,7 +402,7 @@ class Session:
                 "size": self._output_size(),
                 "broken": dict(sorted(broken.items())[:MOST_BROKEN]),
                 "missing": plans.missing if plans else [],
-                "notices": self._notices,
+                "notices": list(dict.fromkeys([*self._notices, *(source.notes if source else ())])),
                 "error": self.error,
                 "render": {**asdict(self.rendering.progress), "output": str(options.output)},
                 "command": command_line(options),
@@ -353,9 +459,20 @@ class Session:
             self._inputs = Inputs(appearance_files(self.options))
             self.source = self.views.source(draft_of(self.options))
             self.source_people = count_people(self.source, self.options)
-            self._notices += [note for note in self.source.notes if note not in self._notices]
         except Exception as error:  # the page has to say so, whatever it was
             self._errors["source"] = explain(error)
+        self._source_work = None
+        self._touch()
+
+    def _hear_source(self, event: Event) -> None:
+        if self._closing.is_set():
+            raise _ClosingError
+        match event:
+            case Stage():
+                self._source_work = {"done": 0, "total": event.frame_count}
+            case FramesDone() if (work := self._source_work) is not None:
+                done = work["done"] + event.frame_count
+                self._source_work = {**work, "done": done} if done < work["total"] else None
         self._touch()
 
     def _hear(self, event: Event) -> None:
@@ -383,6 +500,11 @@ def draft_of(options: RenderOptions) -> RenderOptions:
 
 class _ClosingError(Exception):
     """The preview ends while the driver is being read."""
+
+
+def _name_some(names: list[str]) -> str:
+    """Name one or two, and count more."""
+    return ", ".join(names) if len(names) < 3 else f"{names[0]} and {len(names) - 1} more"
 
 
 def _whom(count: int, current: str) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import cv2
@@ -16,7 +16,7 @@ from motion_transfer.drawing.person import find_people
 from motion_transfer.drawing.renderers.interface import Recipe, Renderer
 from motion_transfer.drawing.source import Source
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.events import ignore
+from motion_transfer.events import Listener, ignore
 from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.media.pictures.formats import open_pictures
 from motion_transfer.media.pictures.photo import encode_jpeg, read_photo, write_png
@@ -25,21 +25,24 @@ from motion_transfer.option import part_of
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.render.composition import make_canvas, open_recipe
 from motion_transfer.render.driver import open_driver
+from motion_transfer.render.inputs import is_clip, list_source_photos
 from motion_transfer.render.options import RendererOptions, RenderOptions, SourceOptions
 from motion_transfer.render.source import read_source
 
 KEPT = 4  # results of each step: some options back and forth without waiting
 COLOUR_SEED = 0  # any: so that a map has the same colours in every session
 COLOUR_SPREAD = 2.5  # standard deviations of the projected map that the colours span, each way
+LONGEST_THUMB_SIDE = 240  # px: three times a tile of the page, for dense screens and tall photos
 LONGEST_PROXY_SIDE = 720  # px: as large as the page shows a frame
 
 
 class Views:
     """Draws views; what is needed once per source, renderer or canvas is kept."""
 
-    def __init__(self) -> None:
+    def __init__(self, listener: Listener = ignore) -> None:
+        """Draw nothing yet; `listener` is told how far it is where a source takes long."""
         self._open_recipe = lru_cache(KEPT)(open_recipe)
-        self._read_source = lru_cache(KEPT)(read_source)
+        self._read_source = lru_cache(KEPT)(partial(read_source, listener=listener))
         self._prepare = lru_cache(KEPT)(self._prepare_source)
         self._canvas = lru_cache(KEPT)(self._make_canvas)
 
@@ -147,6 +150,25 @@ def write_frame(options: RenderOptions, index: int, output: Path) -> None:
         picture = Views().result(options, driver, plan_frames(driver, options), index)
         write_png(folder / "frame.png", picture)
         publish(folder / "frame.png", output)
+
+
+def first_picture(source: Path) -> Frame:
+    """Show a photo, or the first picture of a folder or a video. Raises: InputError."""
+    if source.is_dir():
+        return read_photo(list_source_photos(source)[0]).on_white()
+    if not is_clip(source):
+        return read_photo(source).on_white()
+    picture = next(open_pictures(source).read(), None)
+    if picture is None:
+        raise InputError(f"{source} holds no pictures")
+    return picture
+
+
+def shrink(picture: Frame) -> Frame:
+    """Make a picture as small as its longer side in the page's list of photos."""
+    scale = min(1, LONGEST_THUMB_SIDE / max(picture.shape[:2]))
+    size = max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale))
+    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def write_proxies(clip: Path, folder: Path, stop: threading.Event) -> None:

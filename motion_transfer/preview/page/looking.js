@@ -6,6 +6,7 @@ export class Looking extends EventTarget {
   state = null;
   frame = 0;
   view = "result";
+  photo = null; // the number of the source that its view shows; null: the one that leads
   playing = false;
   drawing = false; // a crop window is being drawn
   movedAt = 0; // ms, when the frame was last changed
@@ -20,11 +21,12 @@ export class Looking extends EventTarget {
     this.state = state;
     if (first) this.frame = state.options.frames?.[0] ?? 0;
     this.frame = this.clamp(this.frame);
+    if (!state.sources.some(({ number }) => number === this.photo)) this.photo = null;
     this.dispatchEvent(new Event("state"));
     this.dispatchEvent(new Event("look"));
   }
 
-  /** Look elsewhere: any of frame, view, playing, drawing; event `look`. */
+  /** Look elsewhere: any of frame, view, photo, playing, drawing; event `look`. */
   look(changes) {
     if ("frame" in changes) {
       changes = { ...changes, frame: this.clamp(changes.frame) };
@@ -52,6 +54,12 @@ export class Looking extends EventTarget {
   get shot() {
     const shots = this.state?.shots ?? [];
     return shots.find(({ start, stop }) => start <= this.frame && this.frame < stop) ?? null;
+  }
+
+  /** Which of the sources is looked at, from 0. */
+  get photoIndex() {
+    const index = this.state.sources.findIndex(({ number }) => number === this.photo);
+    return Math.max(index, 0);
   }
 
   /** Whether the result shows the driver's whole frame, not the square around the person. */

@@ -1,13 +1,19 @@
 // Speaking with the server. Every address is relative: the token is part of the page's own.
 
 /** Post JSON; returns {ok, status, data}, also where nobody answers (status 0). */
-export async function post(path, body) {
+export function post(path, body) {
+  return send(path, "application/json", JSON.stringify(body));
+}
+
+/** Post a file as it is; returns the same. */
+export function postFile(path, file) {
+  return send(path, "application/octet-stream", file);
+}
+
+async function send(path, type, body) {
   try {
-    const response = await fetch(path, {
-      method: "POST",
-      headers: { "Content-Type": "application/json" },
-      body: JSON.stringify(body),
-    });
+    const headers = { "Content-Type": type };
+    const response = await fetch(path, { method: "POST", headers, body });
     const data = await response.json().catch(() => ({}));
     return { ok: response.ok, status: response.status, data: withWords(data, response) };
   } catch {

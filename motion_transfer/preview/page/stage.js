@@ -23,7 +23,7 @@ export class Stage {
   address(layer, frame, draft = false) {
     const { key } = this.looking.state;
     const query = `key=${encodeURIComponent(key)}${draft ? "&draft=1" : ""}`;
-    return `${layer.path(frame)}?${query}`;
+    return `${layer.path(frame, this.looking)}?${query}`;
   }
 
   /** Whether a frame is there, as it is seen when one stops at it. */
@@ -174,6 +174,12 @@ export class Stage {
   }
 
   #label({ draft }, layer) {
+    const { state, photoIndex } = this.looking;
+    const which = byId("which");
+    which.hidden = layer.name !== "source" || state.sources.length < 2;
+    const leads = photoIndex === 0 ? " · leads" : "";
+    const { name } = state.sources[photoIndex];
+    setText(which, `${photoIndex + 1} of ${state.sources.length} · ${name}${leads}`);
     const badge = byId("quality");
     badge.hidden = layer.name !== "result";
     const kind = draft || this.looking.state.options.renderer === "texture" ? "draft" : "network";
@@ -187,6 +193,7 @@ export class Stage {
     const { state, view, frame } = this.looking;
     byId("frame").hidden = true;
     byId("quality").hidden = true;
+    byId("which").hidden = true;
     byId("stage").classList.remove("waiting");
     const trouble = byId("trouble");
     trouble.hidden = false;

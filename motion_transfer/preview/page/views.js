@@ -4,6 +4,7 @@ import { byId, make } from "./dom.js";
 
 const frame = (view) => (index) => `frame/${index}/${view}`;
 const still = (view) => () => `still/${view}`;
+const photo = (_index, looking) => `source/${looking.state.sources[looking.photoIndex].number}`;
 
 // `drafts`: a quick stand-in is there while the picture is under way. `onFrame`: drawn on the
 // driver's frame, so that a crop window can be drawn on it. `quick`: comes within a moment.
@@ -12,7 +13,7 @@ const PICTURES = {
   iuv: { path: frame("iuv"), onFrame: true, quick: true },
   pictures: { path: frame("pictures"), onFrame: true, quick: true },
   features: { path: frame("features") },
-  source: { path: still("source"), still: true, quick: true },
+  source: { path: photo, still: true, quick: true },
   texture: { path: still("texture"), still: true, quick: true },
   map: { path: still("map"), still: true },
 };
