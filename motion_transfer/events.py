@@ -20,7 +20,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Stage:
-    """A step of known length begins (`compare`, `estimate`, `look`, `scan` or `render`)."""
+    """A step of known length begins (`adapt`, `compare`, `estimate`, `look`, `scan`, `render`)."""
 
     name: str
     frame_count: int

