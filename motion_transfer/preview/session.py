@@ -162,9 +162,8 @@ class Session:
         }
         if view not in calls:
             raise InputError(f"view {view!r}; supported are {', '.join(calls)}")
-        return self._ask(
-            (options.renderer, options.sources, options.person, view), calls[view], view
-        )
+        name = options.renderer, tuple(options.sources), options.person, view
+        return self._ask(name, calls[view], view)
 
     def ask_source_picture(self, number: int, *, small: bool = False) -> Future[bytes]:
         """Ask for a picture of a known source, small for the list of them; see `ask_frame`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import http.client
 import json
 import re
@@ -45,6 +46,17 @@ UNTOUCHED = {
     "window": None,
 }
 CONTROLS = "[...document.querySelectorAll('button, input, select, [role=slider], summary')]"
+DROP = """([files, target, kinds]) => {
+  const data = new DataTransfer();
+  for (const [name, text] of files) {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    data.items.add(new File([bytes], name));
+  }
+  for (const kind of kinds) {
+    const how = { dataTransfer: data, bubbles: true, cancelable: true };
+    document.querySelector(target).dispatchEvent(new DragEvent(kind, how));
+  }
+}"""
 PIXEL = """(image, [x, y]) => {
   const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
   const context = canvas.getContext("2d");
@@ -199,6 +211,15 @@ def press(page: Any, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).click()
 
 
+def drop(page: Any, target: str, *paths: Path) -> None:
+    """Drop files on a part of the page."""
+    files = [(path.name, base64.b64encode(path.read_bytes()).decode()) for path in paths]
+    page.evaluate(DROP, [files, target, ["dragover"]])
+    expect(page.locator("#drop-add")).to_be_visible()
+    page.evaluate(DROP, [files, target, ["drop"]])
+    expect(page.locator("#drop-add")).not_to_be_visible()
+
+
 def test_the_page_says_what_it_shows(page) -> None:
     shows(page, 0)
     expect(page.locator("#subject")).to_have_text("source.png in the motion of driver.mkv")
@@ -306,6 +327,31 @@ def test_each_view_shows_its_own_picture(page, preview) -> None:
         assert page.get_by_alt_text(re.compile(".+")).count() >= 1
         shown.add(page.locator("#over").get_attribute("src"))
     assert len(shown) >= len(VIEWS) - 1
+
+
+def test_photos_are_dropped_looked_at_and_removed(page, preview, tmp_path) -> None:
+    photo = shutil.copy(DEMO / "source.png", tmp_path / "again.png")
+    iuv = shutil.copy(DEMO / "source_IUV.png", tmp_path / "again_IUV.png")
+    tiles = page.locator("#photos li")
+    expect(tiles).to_have_count(1)
+    drop(page, "#drop-add", photo, iuv)
+    expect(tiles).to_have_count(2)
+    command = page.get_by_label("The same as a command")
+    expect(command).to_contain_text("--source preview.sources/1/again.png")
+    assert (preview.folder / "preview.sources" / "1" / "again.png").is_file()
+    page.get_by_role("button", name="Show again.png").click()
+    expect(page.locator("#which")).to_have_text("2 of 2 · again.png")
+    shows(page, 0, "source")
+    drop(page, "#drop-add", Path(__file__))
+    fault = page.locator("#sources-fault")
+    expect(fault).to_contain_text("test_preview.py is neither a picture nor a video")
+    expect(tiles).to_have_count(2)
+    press(page, "Let it lead")
+    expect(page.locator("#which")).to_have_text("1 of 2 · again.png · leads")
+    expect(fault).not_to_be_visible()
+    page.get_by_role("button", name="Remove again.png").click()
+    expect(page.locator("#subject")).to_have_text("source.png in the motion of driver.mkv")
+    expect(tiles).to_have_count(1)
 
 
 def test_a_draft_gives_way_to_the_network(page) -> None:

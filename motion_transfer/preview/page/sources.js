@@ -113,7 +113,7 @@ function showSources(looking, busy, actions) {
   const { done, total } = state.source_work ?? {};
   const share = busy && total ? ` ${done} of ${total}` : "";
   const invitation = "Or drop photos, or a video, of this person here; they are kept in";
-  setText(byId("sources-words"), busy ? `${busy}${share}` : `${invitation} ${state.dropped_in}.`);
+  setText(byId("sources-words"), busy ? `${busy}${share}` : `${invitation} ${state.dropped_in}/`);
 }
 
 function showTiles(sources, { look, remove }) {
@@ -124,7 +124,8 @@ function showTiles(sources, { look, remove }) {
   list.replaceChildren(...sources.map(({ number, name }, index) => {
     const leads = index === 0 && sources.length > 1;
     const image = make("img", { src: `source/${number}?small=1&at=${index}`, alt: "" });
-    const show = make("button", { type: "button", className: "photo", title: name }, image);
+    const mark = leads ? [make("span", { className: "leads", textContent: "leads" })] : [];
+    const show = make("button", { type: "button", className: "photo", title: name }, image, ...mark);
     show.setAttribute("aria-label", `Show ${name}${leads ? ", which leads" : ""}`);
     show.addEventListener("click", () => look(number));
     const away = make("button", { type: "button", className: "away", textContent: "×" });
@@ -133,7 +134,6 @@ function showTiles(sources, { look, remove }) {
     away.addEventListener("click", () => remove(number));
     const words = make("span", { className: "photo-name", textContent: name });
     const tile = make("li", {}, show, words, away);
-    if (leads) tile.append(make("span", { className: "leads", textContent: "leads" }));
     tile.dataset.number = number;
     return tile;
   }));

@@ -13,6 +13,7 @@ pytest.importorskip("starlette", reason="needs the `preview` extra")
 
 from starlette.testclient import TestClient
 
+from motion_transfer.preview.dropped import MOST_FILE_BYTES
 from motion_transfer.preview.server import MOST_BODY_BYTES, Guard, make_app
 
 TOKEN = "secret"
@@ -100,6 +101,22 @@ def test_only_its_own_page_may_ask(origin: str, status: int) -> None:
 )
 def test_what_is_sent_is_json_of_a_bounded_size(headers: dict, status: int) -> None:
     assert ask(method="POST", **headers)[0] == status
+
+
+@pytest.mark.parametrize(
+    ("path", "kind", "length", "status"),
+    [
+        (f"/{TOKEN}/sources/1/a.png", "application/octet-stream", MOST_FILE_BYTES, 200),
+        (f"/{TOKEN}/sources/1/a.png", "application/octet-stream", MOST_FILE_BYTES + 1, 413),
+        (f"/{TOKEN}/sources/1/a.png", "multipart/form-data", 9, 415),
+        (f"/{TOKEN}/options", "application/octet-stream", 9, 415),
+        ("/wrong/sources/1/a.png", "application/octet-stream", 9, 404),
+    ],
+)
+def test_files_are_sent_as_no_form_can(path: str, kind: str, length: int, status: int) -> None:
+    headers = {"content_type": kind, "content_length": str(length)}
+    assert ask(path, "POST", **headers)[0] == status
+    assert ask(path, "POST", origin="http://evil.example", **headers)[0] == 403
 
 
 @pytest.mark.parametrize("path", [f"/{TOKEN}/", "/nothing"])

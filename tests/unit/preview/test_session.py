@@ -27,6 +27,7 @@ from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.run import run
 
 COUNT = 40
+LEGS = (9, 10, 13, 14, 5, 6)
 
 
 @pytest.fixture
@@ -355,6 +356,68 @@ def test_a_source_that_is_none_is_said_in_words(options: RenderOptions, open_ses
     session = open_session(replace(options, source=(options.source[0].with_name("gone.png"),)))
     wait_for(lambda: session.error is not None)
     assert "gone.png does not exist" in session.state()["error"]
+
+
+def drop(session: Session, *photos: Path) -> list[int]:
+    """Send files as the page does, together; returns their numbers."""
+    numbers = []
+    for photo in photos:
+        with session.dropped.begin("drop", photo.name) as upload:
+            upload.write(photo.read_bytes())
+            numbers.append(session.know_source(upload.finish()))
+    return numbers
+
+
+def test_dropped_photos_join_replace_and_lead(studio, options, open_session) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    legs = studio.source("legs", parts=LEGS, colours={LEGS: (250, 0, 250)})
+    numbers = drop(session, legs, studio.folder / "legs_IUV.png")
+    wait_for(lambda: session.source is not None)
+    key, alone = session.key, session.ask_still("texture").result()
+    session.choose_sources([0, *numbers])
+    assert session.key != key
+    assert session.ask_still("texture").result() != alone
+    names = [source["name"] for source in session.state()["sources"]]
+    assert names == ["person.png", "legs.png"], "IUV is no source"
+    session.choose_sources([numbers[0], 0])
+    assert [path.name for path in session.options.source] == ["legs.png", "person.png"]
+    assert picture(session.ask_source_picture(numbers[0]).result()).shape == (192, 128, 3)
+    session.choose_sources([0])
+    assert session.key == key
+
+
+def test_a_photo_of_nobody_leaves_the_source_as_it_was(studio, options, open_session) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    photo = studio.image("empty.png", np.full((40, 40, 3), 90, np.uint8))
+    iuv = studio.image("empty_IUV.png", np.zeros((40, 40, 3), np.uint8))
+    key = session.key
+    numbers = drop(session, photo, iuv)
+    with pytest.raises(InputError, match="no person in it"):
+        session.choose_sources([0, *numbers])
+    for wrong in ([], [7], [-1]):
+        with pytest.raises(InputError, match="no such source"):
+            session.choose_sources(wrong)
+    assert (session.options, session.key, session.error) == (options, key, None)
+    assert picture(session.ask_frame(3, "result", key).result()).shape == (96, 64, 3)
+
+
+def test_what_a_saved_job_names_outlives_the_preview(studio, options, tmp_path) -> None:
+    session = Session(options, tmp_path / "job.yaml")
+    session.wait_for_plan()
+    named = drop(session, studio.source("named"), studio.folder / "named_IUV.png")
+    unused = drop(session, studio.source("unused"), studio.folder / "unused_IUV.png")
+    session.choose_sources([0, *named])
+    session.save_job(replace_file=False)
+    session.choose_sources([0, *unused])
+    session.choose_sources([0])
+    session.close()
+    kept = {path.name for path in session.dropped.folder.rglob("*.png")}
+    assert kept == {"named.png", "named_IUV.png"}
+    (job,) = expand(*read_manifest(tmp_path / "job.yaml"))
+    assert [path.name for path in job.options.source] == ["person.png", "named.png"]
+    assert all(path.exists() for path in job.options.source)
 
 
 def test_the_same_features_have_the_same_colours_in_map_and_image() -> None:
