@@ -22,6 +22,7 @@ COMMANDS = {
     "run": "Render the person of a photo in the motion of a driver.",
     "preview": "See a run frame by frame in the browser, before it is rendered.",
     "batch": "Render a manifest of many jobs: validate, run, status, report, clean.",
+    "source": "Keep a person in one file, encoded once, for any number of runs.",
     "demo": "Render a photo and a driver that ship with the program.",
     "train": "Train the network, or fine-tune it on one person.",
     "people": "Synthetic people: photos with exact IUV, and drivers from motion.",

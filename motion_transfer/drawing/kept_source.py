@@ -30,7 +30,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.source import Source, SourcePicture
 from motion_transfer.errors import InputError
 from motion_transfer.media.files import check_readable
 from motion_transfer.media.pictures.photo import decode_png, encode_png
@@ -97,27 +97,28 @@ def load_source(path: Path, texture_size: int) -> Source:
     Raises: InputError if the file is missing, damaged, of another kind or by a newer program.
     """
     with _open(path) as file:
-        photo = decode_png(file.read("photo", "U8", (None,)).numpy().tobytes(), path, file.where)
-        person = decode_png(file.read("person", "U8", (None,)).numpy().tobytes(), path, file.where)
+        picture = _read_picture(file, path)
         texture, visibility, note = _read_texture(file, texture_size)
         clearance = None
         if "clearance" in file.shapes:
             clearance = file.read("clearance", "F32", (2, CLEARANCE_SIZE, CLEARANCE_SIZE))[None]
-    iuv = person.rgb
-    file.expect(iuv.shape == photo.rgb.shape, "its person and its photo differ in size")
-    file.expect(iuv[..., 0].max() <= PART_COUNT, "its person has parts that no body has")
-    file.expect(iuv[..., 0].any(), "it shows nobody")
     return Source(
-        photo,
-        iuv,
+        picture.photo,
+        picture.iuv,
         None,
         texture,
         visibility,
-        alpha=person.alpha,
+        alpha=picture.alpha,
         clearance=clearance,
         notes=(*file.notes, *note),
         kept=path,
     )
+
+
+def load_picture(path: Path) -> SourcePicture:
+    """Read the picture of a kept source, and who is who in it. Raises: InputError."""
+    with _open(path) as file:
+        return _read_picture(file, path)
 
 
 def load_features(
@@ -225,6 +226,18 @@ def _open(path: Path) -> Iterator[_File]:
             {name: tuple(part.get_shape()) for name, part in parts.items()},
             {name: part.get_dtype() for name, part in parts.items()},
         )
+
+
+def _read_picture(file: _File, path: Path) -> SourcePicture:
+    photo, person = (
+        decode_png(file.read(name, "U8", (None,)).numpy().tobytes(), path, file.where)
+        for name in ("photo", "person")
+    )
+    iuv = person.rgb
+    file.expect(iuv.shape == photo.rgb.shape, "its person and its photo differ in size")
+    file.expect(iuv[..., 0].max() <= PART_COUNT, "its person has parts that no body has")
+    file.expect(iuv[..., 0].any(), "it shows nobody")
+    return SourcePicture(photo, iuv, person.alpha)
 
 
 def _read_texture(

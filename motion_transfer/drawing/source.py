@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -91,21 +91,61 @@ def unfold_source(
     pictures: Sequence[SourcePicture],
     texture_size: int,
     iuv_path: Path | None = None,
-    *,
-    garments: Sequence[SourcePicture] = (),
 ) -> Source:
-    """Unfold what photos show into one source.
+    """Unfold what photos show of a person into one source.
 
     Args:
         pictures: The person, one photo or several; the first one leads, see `merge_views`.
         texture_size: Side of the partial texture in texels.
         iuv_path: Where the first photo's IUV was read; None where it was estimated.
-        garments: Laid over the person; later ones win where two give the same part.
-    Raises: InputError for a garment photo that shows none of its parts.
     """
     merged = merge_views(unfold_views(pictures, texture_size))
-    layers = [(merged.texture, merged.visibility)]
-    layers += [unfold_picture(garment, texture_size) for garment in garments]
+    person = pictures[0]
+    notes = [note for picture in pictures for note in _list_notes(picture)]
+    notes += tell_strangers(pictures, merged)
+    return Source(
+        person.photo,
+        person.iuv,
+        iuv_path,
+        merged.texture,
+        merged.visibility,
+        person.alpha,
+        _mean_clearance(pictures),
+        tuple(dict.fromkeys(notes)),  # those of a video are the same for each of its frames
+    )
+
+
+def undress(source: Source, parts: Collection[int]) -> Source:
+    """Take parts of the body out of a source, so that another photo can give them.
+
+    Which texels are theirs is told by the layout; a texel at a part's border may have been seen in
+    a pixel of its neighbour. A photo that is at hand is better not unfolded there to begin with.
+    """
+    if not parts:
+        return source
+    taken = torch.isin(load_uv_layout().part, torch.tensor(sorted(parts)))[None, None].float()
+
+    def left(values: Tensor) -> Tensor:
+        return values * (1 - F.interpolate(taken, values.shape[2:], mode="nearest-exact"))
+
+    return replace(
+        source,
+        texture=left(source.texture),
+        visibility=left(source.visibility),
+        clearance=None if source.clearance is None else left(source.clearance),
+        kept=None,
+    )
+
+
+def dress(source: Source, garments: Sequence[SourcePicture]) -> Source:
+    """Lay garments over a source; later ones win where two give the same part.
+
+    Raises: InputError for a garment photo that shows none of its parts.
+    """
+    if not garments:
+        return source
+    layers = [(source.texture, source.visibility)]
+    layers += [unfold_picture(garment, source.texture.shape[-1]) for garment in garments]
     for garment, (_, shown) in zip(garments, layers[1:], strict=True):
         if garment.parts and not shown.any():
             found = ", ".join(PART_NAMES[p] for p in np.unique(garment.iuv[..., 0]) if p)
@@ -114,20 +154,18 @@ def unfold_source(
                 f" {', '.join(PART_NAMES[p] for p in garment.parts)}; it shows {found}"
             )
     texture, visibility = merge_textures(layers)
-    clearances = [_mean_clearance(pictures), *(_clearance(garment) for garment in garments)]
+    clearances = [_clearance(garment) for garment in garments]
+    if source.clearance is not None:
+        clearances.insert(0, source.clearance)
     clearance = torch.cat(merge_textures([(c[:, :1], c[:, 1:]) for c in clearances]), dim=1)
-    person = pictures[0]
-    notes = [note for picture in (*pictures, *garments) for note in _list_notes(picture)]
-    notes += tell_strangers(pictures, merged)
-    return Source(
-        person.photo,
-        person.iuv,
-        iuv_path,
-        texture,
-        visibility,
-        person.alpha,
-        clearance,
-        tuple(dict.fromkeys(notes)),  # those of a video are the same for each of its frames
+    notes = [*source.notes, *(note for garment in garments for note in _list_notes(garment))]
+    return replace(
+        source,
+        texture=texture,
+        visibility=visibility,
+        clearance=clearance,
+        notes=tuple(dict.fromkeys(notes)),
+        kept=None,
     )
 
 

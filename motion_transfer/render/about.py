@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
+from motion_transfer.drawing.kept_source import inspect_source
 from motion_transfer.drawing.person import find_people
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
 from motion_transfer.drawing.renderers.network import choose_dtype
@@ -33,6 +34,7 @@ from motion_transfer.media.iuv.stream import IuvStream
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES, open_pictures
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.pictures.stream import PictureStream
+from motion_transfer.render.options import is_kept
 from motion_transfer.version import __version__, package_version
 from motion_transfer.weights import SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import inspect_checkpoint
@@ -120,6 +122,8 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
     if order is not None and order not in CHANNEL_ORDERS:
         raise InputError(f"channel order {order!r}; supported are {', '.join(CHANNEL_ORDERS)}")
     suffix = path.suffix.lower()
+    if is_kept(path):
+        return {"what": "a kept source", **inspect_source(path)}
     if suffix == ".safetensors":
         return _describe_weights(path)
     if path.is_dir() or find_iuv_format(path).always_iuv or suffix in VIDEO_SUFFIXES:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motion_transfer.estimate.opening import estimator_facts
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 LIBRARIES = ("torch", "numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy")
 KEYED_ELSEWHERE = {
-    *("source", "source_iuv", "garments", "weights"),  # by the files' content
+    *("source", "source_iuv", "garments", "weights", "adapt"),  # by the files' content
     *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
     *("frames", "frame_rate"),  # by the plan
     *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
@@ -38,25 +39,35 @@ KEYED_ELSEWHERE = {
 
 def source_key(options: SourceOptions, recipe: Recipe) -> str:
     """Compute the key of a source's appearance. Raises: InputError for a file that is missing."""
-    files = [("source", source, iuv) for source, iuv in options.sources]
-    files += [("garment", garment.photo, garment.iuv) for garment in options.garments]
-    content = []
-    for what, photo, given in files:
-        iuv = given or find_source_iuv(photo)
-        content.append(digest_file(photo, what))
-        if iuv:
-            content.append(digest_file(iuv, what))
-        elif not has_own_iuv(photo):
-            content.append(_estimator_facts(options))
     return key_of(
         {
-            "content": content,
+            "content": [facts for _, facts in picture_facts(options)],
             "parts": [garment.parts for garment in options.garments],
             "person": options.person,
             "order": options.source_iuv_order,
             "renderer": [recipe.name, recipe.content],
         }
     )
+
+
+def picture_facts(options: SourceOptions) -> list[tuple[Path, dict[str, Any]]]:
+    """List the sources, then the garments, each with what decides what is seen in it.
+
+    Returns: With each path the SHA-256 of its content, `sha256`; and under `iuv` that of its IUV,
+        or what estimates it, unless the file says all.
+    Raises: InputError for a file that is missing.
+    """
+    files = [("source", source, iuv) for source, iuv in options.sources]
+    files += [("garment", garment.photo, garment.iuv) for garment in options.garments]
+    listed = []
+    for what, photo, given in files:
+        facts: dict[str, Any] = {"sha256": digest_file(photo, what)}
+        if iuv := given or find_source_iuv(photo):
+            facts["iuv"] = digest_file(iuv, what)
+        elif not has_own_iuv(photo):
+            facts["iuv"] = _estimator_facts(options)
+        listed.append((photo, facts))
+    return listed
 
 
 def run_key(

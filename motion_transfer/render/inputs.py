@@ -20,6 +20,7 @@ from motion_transfer.render.options import (
     OutputOptions,
     RenderOptions,
     SourceOptions,
+    is_kept,
 )
 
 CAPTURED = ".bvh"
@@ -42,29 +43,33 @@ def photo_files(options: SourceOptions) -> Iterator[Path]:
 
 
 def is_clip(source: Path) -> bool:
-    """Tell whether a source is a video or a folder, and no single photo."""
+    """Tell whether a source is a video or a folder, and no single photo or kept source."""
+    if is_kept(source):
+        return False
     return source.is_dir() or source.suffix.lower() not in PHOTO_SUFFIXES
 
 
 def iuv_names(source: Path) -> list[Path]:
     """List where the IUV of a source is looked for."""
+    if is_kept(source):
+        return []
     return list_clip_iuv_names(source) if is_clip(source) else list_iuv_names(source)
 
 
 def find_source_iuv(source: Path) -> Path | None:
-    """Find the IUV beside a source; None where it is estimated, or where photos have their own.
+    """Find the IUV beside a source; None where it is estimated, or in the source itself.
 
     Raises: InputError if there is no such source.
     """
     if is_clip(source):
         return next((name for name in list_clip_iuv_names(source) if name.exists()), None)
-    return find_iuv_of(source)
+    return None if is_kept(source) else find_iuv_of(source)
 
 
 def has_own_iuv(source: Path) -> bool:
-    """Tell whether a source is a folder in which the IUV of every photo lies beside it."""
+    """Tell whether a source holds all IUV: it was kept, or is a folder with that of every photo."""
     if not source.is_dir():
-        return False
+        return is_kept(source)
     photos = list_source_photos(source)
     return all(any(name.exists() for name in list_iuv_names(photo)) for photo in photos)
 

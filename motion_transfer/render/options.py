@@ -36,6 +36,7 @@ from motion_transfer.option import (
 
 NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even")
+KEPT_SUFFIX = ".mtsource"
 SMALLEST_WINDOW, LARGEST_WINDOW = 16, 16384
 """Sides, px: a smaller window shows nobody, a larger one takes the memory of a whole machine."""
 
@@ -144,6 +145,14 @@ class SourceOptions(EstimatorOptions):
                 f"{len(self.source_iuv)} source IUV for {len(self.source)} sources; give one for"
                 " each, in their order, or none"
             )
+        if (kept := next(filter(is_kept, self.source), None)) is not None:
+            refused = {
+                "stands alone; to add photos, save it again from all of them": len(self.source) > 1,
+                "holds its IUV; leave out --source-iuv": self.source_iuv,
+                "holds one person; leave out --person": self.person != "largest",
+            }
+            if reasons := [reason for reason, refuses in refused.items() if refuses]:
+                raise InputError(f"source {kept} is a kept source, which {reasons[0]}")
 
     @property
     def sources(self) -> list[tuple[Path, Path | None]]:
@@ -154,6 +163,29 @@ class SourceOptions(EstimatorOptions):
     def source_words(self) -> str:
         """The sources, for messages."""
         return ", ".join(map(str, self.source))
+
+    @property
+    def kept(self) -> Path | None:
+        """The file that `mt source save` wrote, if that is the source."""
+        return self.source[0] if is_kept(self.source[0]) else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeepOptions(SourceOptions):
+    """Who is kept in a file, and for which weights."""
+
+    SECTIONS: ClassVar = ("Source", "Raw pictures", "Garment transfer", "Output")
+
+    weights: Path | None = option(
+        "--weights",
+        "Output",
+        "Checkpoint whose feature map is kept, too; default: lite, which ships. Others can be used"
+        " with the file all the same, and encode the person in each run.",
+        kind="path",
+    )
+    force: bool = option(
+        "--force", "Output", "Replace an existing file.", kind="flag", default=False
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -392,6 +424,11 @@ class RenderOptions(OutputOptions, RendererOptions, InputOptions):
     def worker_count(self) -> int:
         """How many threads to use: as many as asked for, or one for each core that may be used."""
         return self.workers or len(os.sched_getaffinity(0))
+
+
+def is_kept(source: Path) -> bool:
+    """Tell whether a source is a file that `mt source save` wrote, by its ending."""
+    return source.suffix.lower() == KEPT_SUFFIX
 
 
 def read_garment(written: Mapping[str, str]) -> Garment:

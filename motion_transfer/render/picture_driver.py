@@ -14,6 +14,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from motion_transfer.drawing.kept_source import load_picture
 from motion_transfer.drawing.person import Follower, bounding_box
 from motion_transfer.drawing.source import read_person
 from motion_transfer.errors import InputError
@@ -36,7 +37,7 @@ from motion_transfer.media.unchanged import Inputs
 from motion_transfer.media.work import digest_of
 from motion_transfer.render.content import driver_key
 from motion_transfer.render.inputs import is_clip
-from motion_transfer.render.options import InputOptions, SourceOptions
+from motion_transfer.render.options import InputOptions, SourceOptions, is_kept
 from motion_transfer.render.plan import frame_range
 
 ORDER: ChannelOrder = "iuv"
@@ -160,11 +161,16 @@ def _source_landmarks(options: SourceOptions) -> Landmarks:
             f"--fit-body measures a photo, and the source {path} is a folder or a video; name a"
             " photo first, or leave out --fit-body"
         )
-    photo = read_photo(path)
-    iuv_path = iuv_path or find_iuv_of(path)
     choice = options.person
-    if iuv_path is not None:
-        iuv = read_person(photo, iuv_path, choice, options.source_iuv_order, "source")
+    if is_kept(path):
+        kept = load_picture(path)
+        photo, iuv = kept.photo, kept.iuv
+    else:
+        photo = read_photo(path)
+        iuv_path = iuv_path or find_iuv_of(path)
+        order = options.source_iuv_order
+        iuv = read_person(photo, iuv_path, choice, order, "source") if iuv_path else None
+    if iuv is not None:
         box = bounding_box(iuv)
         if box.area:
             choice = f"{box.left},{box.top},{box.right},{box.bottom}"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from motion_transfer.drawing.source import Source, SourcePicture, unfold_source
+from collections.abc import Sequence
+
+from motion_transfer.drawing.kept_source import load_source
+from motion_transfer.drawing.source import Source, SourcePicture, dress, undress, unfold_source
 from motion_transfer.errors import InputError
 from motion_transfer.events import Listener, ignore
 from motion_transfer.media.pictures.photo import read_photo
@@ -23,7 +26,7 @@ def check_photos(options: SourceOptions) -> None:
 
 
 def read_source(options: SourceOptions, texture_size: int, listener: Listener = ignore) -> Source:
-    """Read the source, and garments, and unfold what they show.
+    """Read the source, and garments, and unfold what they show, unless it was kept unfolded.
 
     Args:
         texture_size: Side of the partial texture, which the renderer decides, in texels.
@@ -31,22 +34,33 @@ def read_source(options: SourceOptions, texture_size: int, listener: Listener = 
     Raises: InputError if a file is missing or unfit, sizes differ, nobody or too little is seen,
         or a garment photo shows none of its parts.
     """
+    return read_sources(options, [texture_size], listener)[0]
+
+
+def read_sources(
+    options: SourceOptions, texture_sizes: Sequence[int], listener: Listener = ignore
+) -> list[Source]:
+    """Read one source for several sizes of texture, see `read_source`; pictures are read once."""
     taken = {part for garment in options.garments for part in garment.parts}
-    kept = tuple(part for part in ALL_PARTS if part not in taken)
-    found = read_pictures(options, listener, kept)
+    if options.kept is not None:
+        people = [undress(load_source(options.kept, size), taken) for size in texture_sizes]
+    else:
+        kept = tuple(part for part in ALL_PARTS if part not in taken)
+        found = read_pictures(options, listener, kept)
+        pictures = [entry.picture for entry in found]
+        people = [unfold_source(pictures, size, found[0].iuv_path) for size in texture_sizes]
     garments = [
         _read_garment(garment, options.garments[number + 1 :], options)
         for number, garment in enumerate(options.garments)
     ]
-    pictures = [entry.picture for entry in found]
-    source = unfold_source(pictures, texture_size, found[0].iuv_path, garments=garments)
-    share = float(source.visibility.mean())
+    sources = [dress(person, garments) for person in people]
+    share = float(sources[0].visibility.mean())
     if share < SMALLEST_VISIBLE_SHARE:
         raise InputError(
             f"source {options.source_words} shows too little of the body ({share:.1%} of the"
             " texture); use a larger photo, or choose another --person"
         )
-    return source
+    return sources
 
 
 def _read_garment(

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.drawing.kept_source import load_picture
 from motion_transfer.drawing.moments import Moments
 from motion_transfer.drawing.person import (
     COVERS,
@@ -37,7 +38,7 @@ from motion_transfer.media.pictures.formats import open_pictures
 from motion_transfer.media.pictures.photo import Photo, read_photo
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.render.inputs import find_source_iuv, is_clip, list_source_photos
-from motion_transfer.render.options import EstimatorOptions, SourceOptions
+from motion_transfer.render.options import EstimatorOptions, SourceOptions, is_kept
 from nhrr_core.iuv import ALL_PARTS
 
 ROOM_SHARE = 0.3
@@ -67,7 +68,9 @@ def read_pictures(
     """
     found: list[FoundPicture] = []
     for path, iuv in options.sources:
-        if is_clip(path):
+        if is_kept(path):  # the one that led when it was saved
+            found.append(FoundPicture(replace(load_picture(path), parts=parts)))
+        elif is_clip(path):
             pictures = _read_clip(path, iuv, options, listener)
             found += [FoundPicture(replace(picture, parts=parts)) for picture in pictures]
         else:
