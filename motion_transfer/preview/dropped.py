@@ -14,12 +14,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from av.error import FFmpegError
-from PIL import UnidentifiedImageError
-
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.media.container import find_pictures, open_input
-from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES, open_pictures
 from motion_transfer.media.pictures.photo import explain_damage, open_image
 from motion_transfer.media.publish import explain_disk_errors, extend_name
 
@@ -166,9 +162,8 @@ def name_for(file: Path, name: str) -> str:
             holds = image.format or ""
     except InputError as error:
         if not _is_video(file):
-            if isinstance(error.__context__, UnidentifiedImageError):
-                raise InputError(f"{name} is neither a picture nor a video") from None
-            raise
+            reason = str(error).removeprefix(f"{name} ")
+            raise InputError(f"{name} is no video, and {reason}") from error
         # its ending may claim a photo, or IUV
         return name if suffix in VIDEO_SUFFIXES else f"{name}.mkv"
     if holds not in ENDINGS:  # GIF, which FFmpeg reads, whatever it is called
@@ -178,8 +173,7 @@ def name_for(file: Path, name: str) -> str:
 
 def _is_video(file: Path) -> bool:
     try:
-        with open_input(file) as container:
-            find_pictures(container, "")
-    except (InputError, FFmpegError):
+        open_pictures(file)  # no photo's ending: it is opened as a video
+    except InputError:
         return False
     return True

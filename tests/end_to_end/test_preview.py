@@ -344,7 +344,7 @@ def test_photos_are_dropped_looked_at_and_removed(page, preview, tmp_path) -> No
     shows(page, 0, "source")
     drop(page, "#drop-add", Path(__file__))
     fault = page.locator("#sources-fault")
-    expect(fault).to_contain_text("test_preview.py is neither a picture nor a video")
+    expect(fault).to_contain_text("test_preview.py is no video, and is not a picture")
     expect(tiles).to_have_count(2)
     press(page, "Let it lead")
     expect(page.locator("#which")).to_have_text("1 of 2 · again.png · leads")

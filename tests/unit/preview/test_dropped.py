@@ -56,7 +56,7 @@ def test_what_a_file_holds_decides_its_ending(studio, files: DroppedFiles) -> No
     "data", [b"", b"text", b"#EXTM3U\nfile:///etc/passwd", b"ffconcat version"]
 )
 def test_what_is_no_picture_is_refused_and_leaves_nothing(files: DroppedFiles, data: bytes) -> None:
-    with pytest.raises(InputError, match=r"me\.png is neither a picture nor a video"):
+    with pytest.raises(InputError, match=r"me\.png is no video, and is not a picture"):
         send(files, "me.png", data)
     assert not [path for path in files.folder.rglob("*") if path.is_file()]
     assert files.bytes == 0
