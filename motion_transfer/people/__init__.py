@@ -42,15 +42,15 @@ if TYPE_CHECKING:
     from motion_transfer.people.free.person import FreePerson
     from motion_transfer.people.person import DressedPerson, Person, sample_person
     from motion_transfer.people.photo import PersonPhoto, Shot, sample_shot
-    from motion_transfer.people.picture.iuv_noise import IuvNoise, add_iuv_noise
+    from motion_transfer.people.picture.iuv_noise import IuvNoise
 
 __all__ = [
     "FIRST_USE", "HELPERS_FIRST_USE", "SCHEME", "AlbumOptions", "Body", "BodyModel", "Camera",
     "DressedPerson", "FreePerson", "IuvNoise", "MotionDriver", "MotionOptions", "PeopleDataset",
     "PeopleStream", "Person", "PersonPhoto", "PosedBody", "Shape", "Shot", "Split", "Triangles",
-    "add_iuv_noise", "are_helpers_cached", "check_motion", "check_share", "depths", "find_assets",
-    "is_cached", "is_motion", "load_assets", "load_body_model", "load_helpers", "open_motion",
-    "rasterise", "record_motion", "sample_person", "sample_shot", "write_album",
+    "are_helpers_cached", "check_motion", "check_share", "depths", "find_assets", "is_cached",
+    "is_motion", "load_assets", "load_body_model", "load_helpers", "open_motion", "rasterise",
+    "record_motion", "sample_person", "sample_shot", "write_album",
 ]  # fmt: skip
 
 _NAMES_OF = {
@@ -66,7 +66,7 @@ _NAMES_OF = {
     "free.person": "FreePerson",
     "person": "DressedPerson Person sample_person",
     "photo": "PersonPhoto Shot sample_shot",
-    "picture.iuv_noise": "IuvNoise add_iuv_noise",
+    "picture.iuv_noise": "IuvNoise",
 }
 _HOMES = {name: home for home, names in _NAMES_OF.items() for name in names.split()}
 

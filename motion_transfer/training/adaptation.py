@@ -54,21 +54,21 @@ class AdaptationSettings:
 
     Attributes:
         learning_rate: The highest, of Adam.
-        held_every: One step of so many holds what no photo shows; 0: none does.
-        held_poses: How many poses do that: those that show most of it.
+        held_every: One step of so many holds a pose that shows what no photo shows; 0: none does.
+            The whole of it is held: with the hidden side alone, sides that are seen get worse in
+            other poses than the photo's.
+        held_poses: How many poses there are.
         maps: How many feature maps are learned from, at least one for each way to draw a photo.
-        noisy_share: Of the maps, those whose IUV has the faults of DensePose's.
         light, tint: Standard deviations of the logarithms of exposure, and of each colour's gain.
         seed: Of whatever is left to chance.
     """
 
-    steps: int = 120
-    learning_rate: float = 1e-3
+    steps: int = 240
+    learning_rate: float = 2e-3
     held_every: int = 4
     held_poses: int = 8
-    maps: int = 8
-    noisy_share: float = 0.25
-    light: float = 0.08
+    maps: int = 4
+    light: float = 0.05
     tint: float = 0.02
     seed: int = 0
 

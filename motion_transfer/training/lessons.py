@@ -17,27 +17,29 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Protocol
 
-import cv2
 import numpy as np
 import torch
+import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.outline import stand_out
-from motion_transfer.drawing.person import bounding_box, disc, occupancy
-from motion_transfer.drawing.source import SourcePicture, unfold_source, unfold_views
+from motion_transfer.drawing.person import bounding_box, occupancy
+from motion_transfer.drawing.source import Source, SourcePicture, unfold_source, unfold_views
 from motion_transfer.drawing.views import equalise_light
 from motion_transfer.drawing.window import DRAWN_UNSCALED, SIDE_STEP, Window, plan_window
-from motion_transfer.people import IuvNoise, add_iuv_noise
-from motion_transfer.training.metrics import shown_pixels
+from motion_transfer.training.metrics import SHOWN_TEXELS
 from motion_transfer.training.pictures import Image, Plane
 from motion_transfer.training.samples import BEYOND_THE_PHOTO, cut_picture, to_tensor
 from motion_transfer.training.step import Batch
-from nhrr_core import NeuralReRenderer
+from nhrr_core import NeuralReRenderer, load_uv_layout, texture_coordinates
 from nhrr_core.config import COLOUR_CHANNELS
 
 Gains = Float64[np.ndarray, " 3"]
 """What the values of each colour are multiplied by."""
+
+MOST_MAPS = 16
+"""More would take too much memory: 22 MB each with `lite`."""
 
 MOST_TOGETHER = 4
 """So many other photos at most are merged to draw one from; each takes a second or two."""
@@ -51,9 +53,6 @@ SHIFT = 0.06
 HIDDEN_ENOUGH = 0.5
 """Poses are held that show half as much of what is hidden as the one that shows most, or more."""
 
-HIDDEN_BORDER_PX = 3
-"""Around what is hidden, this far, colours are held as well: borders are drawn from both sides."""
-
 
 class LessonSettings(Protocol):
     """What lessons read of `AdaptationSettings`."""
@@ -64,8 +63,6 @@ class LessonSettings(Protocol):
     def held_poses(self) -> int: ...
     @property
     def maps(self) -> int: ...
-    @property
-    def noisy_share(self) -> float: ...
     @property
     def light(self) -> float: ...
     @property
@@ -132,33 +129,28 @@ class Lessons:
             yield {name: each.to(self._device) for name, each in lesson.items()}
 
     def _vary(self) -> list[Likeness]:
-        """Encode the ways in which each photo is drawn, with faults and lights of their own."""
+        """Encode the ways in which each photo is drawn; every other one has a light of its own."""
         settings, random, number = self._settings, self._random, len(self._pictures)
         ways = [(photo, kind) for photo in range(number) for kind in range(3 if number > 1 else 1)]
         ways = [ways[index] for index in random.permutation(len(ways))]
         likenesses = []
-        for index in range(min(max(settings.maps, number), 2 * settings.maps)):
+        for index in range(min(max(settings.maps, number), MOST_MAPS)):
             photo, kind = ways[index % len(ways)]
             others = random.permutation([other for other in range(number) if other != photo])
             # from itself, from another one, or from several together
             chosen = ([photo], others[:1], others[:MOST_TOGETHER])[kind]
-            noisy = random.random() < settings.noisy_share
-            lit = random.normal(0, settings.light) + random.normal(0, settings.tint, 3)
-            # one of four as they are, one whose own light is to be made out, two alike
-            gains = np.ones(3) if index % 4 == 0 else np.exp(lit)
-            shown = [relight(self._pictures[int(each)], gains) for each in chosen]
-            if noisy:
-                shown = [self._spoil(picture) for picture in shown]
-            wanted = np.ones(3) if index % 4 == 2 else gains
-            likenesses.append(Likeness(self._encode(shown), photo, wanted))
+            gains = np.exp(random.normal(0, settings.light) + random.normal(0, settings.tint, 3))
+            if index % 2 == 0:
+                gains = np.ones(3)
+            shown = self._unfold([relight(self._pictures[int(each)], gains) for each in chosen])
+            likenesses.append(Likeness(self._encode(shown), photo, gains))
         return likenesses
 
-    def _spoil(self, picture: SourcePicture) -> SourcePicture:
-        return replace(picture, iuv=add_iuv_noise(picture.iuv, IuvNoise.densepose(), self._random))
+    def _unfold(self, pictures: Sequence[SourcePicture]) -> Source:
+        return unfold_source(pictures, self._model.config.finest_texture)
 
-    def _encode(self, pictures: Sequence[SourcePicture]) -> Float[Tensor, "1 D T T"]:
-        """Compute the feature map of some photos as a run would."""
-        source = unfold_source(pictures, self._model.config.finest_texture)
+    def _encode(self, source: Source) -> Float[Tensor, "1 D T T"]:
+        """Compute the feature map of a source as a run would."""
         clearance, device = source.clearance, self._device
         with torch.no_grad():
             return self._model.encode_texture(
@@ -210,31 +202,29 @@ class Lessons:
     def _hold(self, poses: Sequence[Image]) -> list[Batch]:
         """Draw poses that show what no photo does, as the model draws them before it learns."""
         size = self._model.config.image_size
-        seen = [bounding_box(iuv) for iuv in poses]
+        boxes = [bounding_box(iuv) for iuv in poses]
         crops = [
             plan_window([box]).cut(iuv, size)
-            for iuv, box in zip(poses, seen, strict=True)
+            for iuv, box in zip(poses, boxes, strict=True)
             if box.area
         ]
-        hidden = [hidden_pixels(iuv, self._pictures) for iuv in crops]
-        amounts = np.array([np.count_nonzero(mask) for mask in hidden])
-        if not amounts.any():
+        if not crops:
             return []
-        fit = np.flatnonzero(amounts >= HIDDEN_ENOUGH * amounts.max())
-        feature_map = self._encode(self._pictures)
+        source = self._unfold(self._pictures)
+        seen = F.adaptive_max_pool2d(source.visibility, SHOWN_TEXELS)[0, 0] > 0
+        hidden = np.array([np.count_nonzero(hidden_pixels(iuv, seen)) for iuv in crops])
+        fit = np.flatnonzero(hidden >= HIDDEN_ENOUGH * hidden.max())
+        spread = np.linspace(0, len(fit) - 1, self._settings.held_poses).round().astype(int)
+        feature_map = self._encode(source)
         held = []
-        for index in fit[
-            np.linspace(0, len(fit) - 1, self._settings.held_poses).round().astype(int)
-        ]:
+        for index in fit[spread]:
             iuv = _stack(crops[index])
             with torch.no_grad():
                 drawn = self._model.render(feature_map, iuv.to(self._device))
-            around = cv2.dilate(hidden[index].astype(np.uint8), disc(HIDDEN_BORDER_PX)) > 0
             lesson = {
                 "feature_map": feature_map,
                 "target_iuv": iuv,
                 "target_image": lay_over_white(drawn),
-                "learned": torch.from_numpy(around)[None, None],
             }
             if self._model.config.alpha:
                 lesson["target_alpha"] = drawn[:, COLOUR_CHANNELS:]
@@ -282,12 +272,12 @@ def take_portrait(picture: SourcePicture, *, alpha: bool) -> Portrait:
     return Portrait(picture.photo.rgb, picture.iuv, cover if alpha else None, plan_window([box]))
 
 
-def hidden_pixels(iuv: Image, pictures: Sequence[SourcePicture]) -> Bool[np.ndarray, "H W"]:
-    """Mark the body's pixels that none of some photos shows."""
-    seen = np.zeros(iuv.shape[:2], bool)
-    for picture in pictures:
-        seen |= shown_pixels(picture.iuv, iuv)
-    return (iuv[..., 0] > 0) & ~seen
+def hidden_pixels(iuv: Image, seen: Bool[Tensor, "T T"]) -> Bool[np.ndarray, "H W"]:
+    """Mark the body's pixels whose texel is not among those that are seen."""
+    stacked = _stack(iuv)
+    place = texture_coordinates(stacked, load_uv_layout().charts)
+    column, row = (place * len(seen)).long().clamp(0, len(seen) - 1).unbind(-1)
+    return ((stacked[:, 0] > 0) & ~seen[row, column])[0].numpy()
 
 
 def lay_over_white(drawn: Float[Tensor, "B K H W"]) -> Float[Tensor, "B 3 H W"]:
