@@ -39,6 +39,7 @@ def render_video(
     weights: AnyPath | None = None,
     background: str = "white",
     workers: int | None = None,
+    adapt: bool = False,
     compile: bool | None = None,
     frame_rate: str | float | Fraction | None = None,
     codec: str | None = None,
@@ -79,6 +80,8 @@ def render_video(
         weights: Checkpoint of the network; else the one that ships.
         background: `white`, `black`, `#rrggbb` or `photo`.
         workers: Threads; else one for each core.
+        adapt: Let the network learn the source's person first, some minutes; later runs find it
+            done.
         compile: Whether to compile the network; else where it pays.
         frame_rate: Frames per second, exact if given as a string or Fraction.
         codec, crf: Of a video; else by container and codec.
@@ -117,6 +120,7 @@ def render_video(
             weights=_path(weights),
             background=background,
             workers=workers,
+            adapt=adapt,
             compile=compile,
             output=Path(output),
             frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),

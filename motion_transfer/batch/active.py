@@ -30,7 +30,8 @@ def scan_name(options: RenderOptions) -> str:
 
 def source_name(options: RenderOptions) -> str:
     """Name a source's appearance, the feature map; jobs of one name share it."""
-    return _name("source", part_of(options, SourceOptions), options.renderer, options.weights)
+    person = part_of(options, SourceOptions)
+    return _name("source", person, options.renderer, options.weights, options.adapt)
 
 
 @cache

@@ -119,10 +119,12 @@ def encode(options: RenderOptions) -> tuple[bytes, bytes, tuple[str, ...]]:
     Returns: The source with what it was read from, its appearance, and what is worth saying.
     Raises: InputError, WeightsError.
     """
-    from motion_transfer.render.composition import open_recipe
+    from motion_transfer.events import ignore
+    from motion_transfer.render.composition import open_recipe, settle_weights
     from motion_transfer.render.inputs import appearance_files
     from motion_transfer.render.source import read_source
 
+    options = settle_weights(options, ignore)
     inputs = Inputs(appearance_files(options))
     recipe = open_recipe(options)
     source = read_source(options, recipe.texture_size)
@@ -138,13 +140,19 @@ def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[byt
         from.
     """
     from motion_transfer.events import ignore
-    from motion_transfer.render.composition import open_recipe, plan_run, prepare_run
+    from motion_transfer.render.composition import (
+        open_recipe,
+        plan_run,
+        prepare_run,
+        settle_weights,
+    )
     from motion_transfer.render.engine import CHUNKS_AT_ONCE
     from motion_transfer.render.plan import describe_missing
     from motion_transfer.render.run import output_key, piece_of
 
     driver = pickle.loads(scanned())
     plan = plan_run(options, driver)
+    options = settle_weights(options, ignore)  # in the cache by now
     recipe = open_recipe(options)
     source, inputs = pickle.loads(encoded())
     run = prepare_run(options, driver, plan, recipe, source, inputs, ignore)

@@ -23,6 +23,7 @@ COMMANDS = {
     "preview": "See a run frame by frame in the browser, before it is rendered.",
     "batch": "Render a manifest of many jobs: validate, run, status, report, clean.",
     "source": "Keep a person in one file, encoded once, for any number of runs.",
+    "adapt": "Let the network learn one person from their own photos.",
     "demo": "Render a photo and a driver that ship with the program.",
     "train": "Train the network, or fine-tune it on one person.",
     "people": "Synthetic people: photos with exact IUV, and drivers from motion.",

@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
+from motion_transfer.cli.progress import choose_listener
 from motion_transfer.cli.run import pair_garments
 from motion_transfer.cli.terminal import tell
 from motion_transfer.errors import InputError
@@ -68,6 +69,10 @@ def preview(
         options = _options_of_job(manifest, job)
     else:
         options = _options_of_words(words)
+    if options.adapt:
+        from motion_transfer.render.composition import settle_weights
+
+        options = settle_weights(options, choose_listener(quiet=False, as_json=False))
     if frame is not None:
         from motion_transfer.preview.views import write_frame
 

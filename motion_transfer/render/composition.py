@@ -87,6 +87,7 @@ def compose(
     scan = scan_driver(options, folder, listener, workers=options.worker_count)
     scanned(scan)
     plan = plan_run(options, scan)
+    options = settle_weights(options, listener)
     inputs = Inputs(appearance_files(options))
     recipe = open_recipe(options)
     source = read_source(options, recipe.texture_size, listener)
@@ -94,6 +95,19 @@ def compose(
         listener(Notice(note))
     prepared = prepare_run(options, scan, plan, recipe, source, inputs, listener)
     return Composed(prepared, recipe.appearance_of(source))
+
+
+def settle_weights(options: RenderOptions, listener: Listener) -> RenderOptions:
+    """Let the weights learn the person first, if that is asked for, or find them in the cache.
+
+    Returns: The options, whose weights are then those that are drawn with.
+    Raises: InputError and its kinds.
+    """
+    if not options.adapt:
+        return options
+    from motion_transfer.render.adapted import adapt_run  # what learns takes a while to import
+
+    return adapt_run(options, listener)
 
 
 def read_format(options: OutputOptions) -> OutputFormat:

@@ -189,6 +189,36 @@ class KeepOptions(SourceOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AdaptOptions(SourceOptions):
+    """Whom weights are to learn, and which weights."""
+
+    SECTIONS: ClassVar = ("Source", "Raw pictures", "Garment transfer", "Learning", "Output")
+
+    weights: Path | None = option(
+        "--weights",
+        "Learning",
+        "Checkpoint to start from; default: lite, which ships.",
+        kind="path",
+    )
+    steps: int | None = option(
+        "--steps",
+        "Learning",
+        "How long to learn; the default takes some minutes on two cores.",
+        kind="integer",
+    )
+    force: bool = option(
+        "--force", "Output", "Replace an existing file.", kind="flag", default=False
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.garments:
+            raise InputError("weights learn a person, and no garments; give those to `mt run`")
+        if self.steps is not None and self.steps < 1:
+            raise InputError(f"steps is {self.steps}; it must be at least 1")
+
+
+@dataclass(frozen=True, kw_only=True)
 class DriverOptions(EstimatorOptions):
     """Whose motion it is.
 
@@ -294,6 +324,13 @@ class RendererOptions(_Part):
         "Checkpoint for nhrr, safetensors; default: lite, which ships.",
         kind="path",
     )
+    adapt: bool = option(
+        "--adapt",
+        "Rendering",
+        "Let the network learn the source's person first, some minutes; later runs find it done.",
+        kind="flag",
+        default=False,
+    )
     compile: bool | None = option(
         "--compile/--no-compile",
         "Rendering",
@@ -305,6 +342,8 @@ class RendererOptions(_Part):
         super().__post_init__()
         if self.weights is not None and RENDERERS[self.renderer].default_weights is None:
             raise InputError(f"the {self.renderer} renderer uses no weights; leave out --weights")
+        if self.adapt and RENDERERS[self.renderer].default_weights is None:
+            raise InputError(f"the {self.renderer} renderer learns nothing; leave out --adapt")
 
     @property
     def weights_files(self) -> list[Path]:
