@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
 
 from motion_transfer.cli.options import FILE
-from motion_transfer.cli.progress import long_wait
+from motion_transfer.cli.progress import choose_listener, long_wait
+from motion_transfer.cli.terminal import tell
+from motion_transfer.media.iuv.formats import ChannelOrder
 
 
 @click.command()
@@ -23,7 +25,11 @@ def info(topic: str, as_json: bool) -> None:
 
 
 def _tell(facts: dict[str, Any], as_json: bool) -> None:
-    click.echo(json.dumps(facts, indent=2) if as_json else _layout(facts))
+    if as_json:
+        click.echo(json.dumps(facts, indent=2))
+        return
+    for line in _layout(facts).split("\n"):  # files say what they like of themselves
+        tell(line)
 
 
 def _layout(facts: dict[str, Any], indent: str = "") -> str:
@@ -40,14 +46,43 @@ def _layout(facts: dict[str, Any], indent: str = "") -> str:
 
 
 @click.command()
-@click.argument("path", type=FILE)
+@click.argument("paths", type=FILE, nargs=-1, required=True, metavar="PATH...")
 @click.option("--iuv-order", metavar="ORDER", help="Take the channels as iuv or vui.")
+@click.option(
+    "--coverage",
+    type=FILE,
+    metavar="FILE",
+    help="Write a picture (PNG) of what the photos show of the body, and which of them.",
+)
+@click.option("--force", is_flag=True, help="Replace an existing picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def inspect(path: Path, iuv_order: str | None, as_json: bool) -> None:
-    """Say what PATH holds: IUV (order, size, parts, gaps, people), photo, or weights."""
-    from motion_transfer.render.about import describe_path
+def inspect(
+    paths: tuple[Path, ...],
+    iuv_order: str | None,
+    coverage: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Say what PATH holds: IUV (order, size, parts, gaps, people), photo, weights, kept source.
 
-    _tell(describe_path(path, iuv_order), as_json)
+    Of several photos of one person (or with --coverage also of one, of a folder or a video): how
+    much of the body they show, which of them, how well, and which photo would help most.
+
+    \b
+    mt inspect dance_iuv/
+    mt inspect front.jpg back.jpg --coverage coverage.png
+    """
+    if len(paths) == 1 and coverage is None:
+        from motion_transfer.render.about import describe_path
+
+        _tell(describe_path(paths[0], iuv_order), as_json)
+        return
+    from motion_transfer.render.about_source import describe_source
+    from motion_transfer.render.options import SourceOptions
+
+    options = SourceOptions(source=paths, source_iuv_order=cast(ChannelOrder | None, iuv_order))
+    listener = choose_listener(quiet=as_json, as_json=False)
+    _tell(describe_source(options, coverage, listener, force=force), as_json)
 
 
 @click.group()

@@ -123,7 +123,7 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
         raise InputError(f"channel order {order!r}; supported are {', '.join(CHANNEL_ORDERS)}")
     suffix = path.suffix.lower()
     if is_kept(path):
-        return {"what": "a kept source", **inspect_source(path)}
+        return _describe_kept(path)
     if suffix == ".safetensors":
         return _describe_weights(path)
     if path.is_dir() or find_iuv_format(path).always_iuv or suffix in VIDEO_SUFFIXES:
@@ -156,6 +156,19 @@ def _describe_weights(path: Path) -> Facts:
         "parameters": f"{info.parameter_count / 1e6:.2f} M",
         "configuration": info.config.to_dict(),
         "notes": info.notes or "none",
+    }
+
+
+def _describe_kept(path: Path) -> Facts:
+    facts = inspect_source(path)
+    made_of = facts.get("made of")
+    if isinstance(made_of, list):
+        facts["made of"] = {str(number): entry for number, entry in enumerate(made_of, start=1)}
+    return {
+        "what": "a kept source (safetensors)",
+        "file size": f"{path.stat().st_size / 1e6:.1f} MB",
+        **facts,
+        "notes": facts.get("notes") or "none",
     }
 
 

@@ -116,8 +116,8 @@ def test_it_can_be_dressed_and_kept_again(studio, mt, draft, kept) -> None:
     result = mt("source", "save", dressed, "--source", kept, *garment, "-q")
     assert (result.code, result.out, result.err) == (0, "", "")
     made_of = json.loads(mt("inspect", dressed, "--json").out)["made of"]
-    assert [entry["file"] for entry in made_of] == ["me.mtsource", "dress.png"]
-    assert made_of[1]["parts"] == ["torso-back", "torso-front"]
+    assert [entry["file"] for entry in made_of.values()] == ["me.mtsource", "dress.png"]
+    assert made_of["2"]["parts"] == ["torso-back", "torso-front"]
     driver = studio.driver(1)
     assert draft("--source", dressed, "--driver", driver, "-o", studio.folder / "kept").code == 0
     more = ("--driver", driver, "-o", studio.folder / "worn")
@@ -141,8 +141,9 @@ def test_a_batch_takes_it(studio, mt, kept) -> None:
 
 def test_what_is_in_it(studio, mt, kept, checkpoint) -> None:
     told = json.loads(mt("inspect", kept, "--json").out)
-    assert told["made of"][0]["file"] == "person.png"
-    digests = [told["made of"][0][key] for key in ("sha256", "iuv")] + [told["weights"]["sha256"]]
+    photo = told["made of"]["1"]
+    assert photo["file"] == "person.png"
+    digests = [photo["sha256"], photo["iuv"], told["weights"]["sha256"]]
     assert all(len(digest) == 64 and set(digest) <= set(DIGITS) for digest in digests)
     assert told["weights"]["file"] == checkpoint.name
     words = mt("inspect", kept).out

@@ -211,14 +211,15 @@ def npy_of(draw: st.DrawFn, data: bytes) -> bytes:
 
 @st.composite
 def safetensors_of(draw: st.DrawFn, data: bytes) -> bytes:
-    """The header, or the configuration in it, changed as text, its length right; or the bytes."""
+    """The header, or a text of its metadata, changed as text, its length right; or the bytes."""
     if draw(st.integers(0, 3)) == 0:
         return draw(bytes_of(data))
     length = int.from_bytes(data[:8], "little")
     head = json.loads(data[8 : 8 + length])
     if draw(st.booleans()):
         metadata = head["__metadata__"]
-        metadata["config"] = draw(text_of(metadata["config"]))
+        key = draw(st.sampled_from(sorted(metadata)))
+        metadata[key] = draw(text_of(metadata[key]))
         text = json.dumps(head)
     else:
         text = draw(text_of(json.dumps(head)))

@@ -20,10 +20,17 @@ from reference import densepose_dump
 
 from fuzz import mutations
 from motion_transfer.batch.run import check_batch, read_batch
+from motion_transfer.drawing.kept_source import (
+    inspect_source,
+    load_features,
+    load_source,
+    save_source,
+)
+from motion_transfer.drawing.source import SourcePicture, unfold_source
 from motion_transfer.media.driver_kind import tell_kind
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.pictures.formats import open_pictures
-from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.media.pictures.photo import Photo, read_photo
 from motion_transfer.people.motion.bvh.file import read_bvh
 from motion_transfer.people.motion.bvh.frames import body_frames
 from motion_transfer.render.about import describe_path
@@ -251,6 +258,20 @@ def _weights(folder: Path) -> Iterator[Path]:
     yield path
 
 
+def _kept_sources(folder: Path) -> Iterator[Path]:
+    photo = Photo(folder / "p.png", Studio(folder).dress(Studio(folder).iuv()), None, turned=False)
+    source = unfold_source([SourcePicture(photo, Studio(folder).iuv())], 32)
+    path = folder / "me.mtsource"
+    save_source(path, [source], {"0" * 64: torch.zeros(1, 4, 32, 32)}, {"made of": []})
+    yield path
+
+
+def _read_kept(path: Path) -> None:
+    load_source(path, 32)
+    load_features(path, "0" * 64, (1, 4, 32, 32))
+    inspect_source(path)
+
+
 TARGETS = {
     "images": Target(_iuv_pictures, mutations.png_of, _read_iuv),
     "dumps": Target(_dumps, mutations.zip_of, _read_iuv),
@@ -263,6 +284,7 @@ TARGETS = {
         _settings, mutations.text_file_of, lambda path: build_config(read_settings(path))
     ),
     "weights": Target(_weights, mutations.safetensors_of, load_checkpoint),
+    "sources": Target(_kept_sources, mutations.safetensors_of, _read_kept),
     "videos": Target(_videos, mutations.bytes_of, _read_video),
     "photos": Target(_photos, mutations.png_of, _read_photo),
 }
