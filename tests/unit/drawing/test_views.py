@@ -59,7 +59,7 @@ def view(
     seen: Bool[Tensor, "T T"] = EVERYWHERE,
     rating: float | Float[Tensor, "T T"] = 1.0,
     pattern: Float[Tensor, "T T"] | float = 0.0,
-    light: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    light: tuple[float, ...] = (1.0, 1.0, 1.0),
 ) -> View:
     """A photo of a person under some light, unfolded."""
     lit = (clothed() if colours is None else colours) * torch.tensor(light)[:, None, None] ** (
@@ -161,7 +161,7 @@ DARKER, BRIGHTER = (0.7,) * 3, (1.3,) * 3
 @pytest.mark.parametrize("light", [DARKER, BRIGHTER])
 @pytest.mark.parametrize("seen", [EVERYWHERE, RIGHT])
 def test_exposure_comes_back_to_the_first(
-    light: tuple[float, float, float], seen: Bool[Tensor, "T T"]
+    light: tuple[float, ...], seen: Bool[Tensor, "T T"]
 ) -> None:
     first = view(pattern=UPRIGHT, seen=LEFT)
     other = view(pattern=UPRIGHT, seen=seen, light=light)
@@ -173,7 +173,7 @@ def test_exposure_comes_back_to_the_first(
 
 
 @pytest.mark.parametrize("light", [(1.15, 1.0, 0.85), (0.9, 1.0, 1.15)])
-def test_white_balance_comes_nearer_to_the_first(light: tuple[float, float, float]) -> None:
+def test_white_balance_comes_nearer_to_the_first(light: tuple[float, ...]) -> None:
     first, other = view(), view(light=light)
     assert apart(equalise_light([first, other])[1], first) < 0.9 * apart(other, first)
 
