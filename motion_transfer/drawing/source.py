@@ -169,12 +169,18 @@ def dress(source: Source, garments: Sequence[SourcePicture]) -> Source:
     )
 
 
-def unfold_views(pictures: Sequence[SourcePicture], texture_size: int) -> list[View]:
-    """Unfold each photo of a person, and rate how well it sees each texel."""
+def unfold_views(
+    pictures: Sequence[SourcePicture], texture_size: int, *, rated: bool = False
+) -> list[View]:
+    """Unfold each photo of a person, and rate how well it sees each texel.
+
+    Args:
+        rated: Whether one photo alone is rated as well, which a merge does not need.
+    """
     views = []
     for picture in pictures:
         texture, visibility = unfold_picture(picture, texture_size)
-        if len(pictures) == 1:  # nothing to compare with
+        if len(pictures) == 1 and not rated:  # nothing to compare with
             return [View(str(picture.photo.path), texture, visibility, visibility)]
         rating = rate_texels(picture.photo.rgb, picture.iuv)
         fine = F.interpolate(rating, (texture_size, texture_size), mode="bilinear")
