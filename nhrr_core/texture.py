@@ -148,7 +148,7 @@ def mirror_texture(
     Source: this project's.
     """
     size = texture.shape[-1]
-    side, depth = (_resize_twins(twin, size) for twin in (side_twin, depth_twin))
+    side, depth = (resize_twins(twin, size) for twin in (side_twin, depth_twin))
     colours, shown = texture.flatten(2), visibility.flatten(2) > 0
     # side again: by then the side twin has got the colours of its own other face
     for twin in (side, depth, side):
@@ -217,7 +217,7 @@ def _lie_at_their_place(position: Float[Tensor, "256 256 3"], size: int) -> Bool
     return F.interpolate(near[None, None].float(), (size, size), mode="nearest")[0, 0] > 0
 
 
-def _resize_twins(twin: Int64[Tensor, "S S"], size: int) -> Int64[Tensor, " L"]:
+def resize_twins(twin: Int64[Tensor, "S S"], size: int) -> Int64[Tensor, " L"]:
     """A table of twins for a texture of another size, flat; the nearest texels'."""
     own = twin.shape[-1]
     if size == own:

@@ -20,7 +20,10 @@ from jaxtyping import Bool, Float, Float32, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.person import bounding_box
-from nhrr_core import load_uv_layout, texture_coordinates
+from nhrr_core import PART_GROUPS, load_uv_layout, texture_coordinates
+from nhrr_core.texture import resize_twins
+
+HEAD = PART_GROUPS["head"]
 
 RATED_SIZE = 64
 """Side of the texture, texels, in which pixels are counted: fewer would count noise."""
@@ -34,10 +37,13 @@ EDGE_SHARE = 0.02
 EDGE_TRUST = 0.05
 """What is left of that at the very edge: where no other photo sees the place, it still counts."""
 
-LEAD = 1.5
+LEAD = 3.0
 """The first photo is preferred to others that see a texel up to so many times as well."""
 
-WIDE, NARROW = 2, 8
+FACE_LEAD = 4.0
+"""One photo gives the head, as far as it sees it: a face mixed from several has double features."""
+
+WIDE, NARROW = 4, 8
 """Powers of the ratings by which colours, and patterns on them, are mixed."""
 
 BAND_SHARE = 1 / 32
@@ -49,11 +55,16 @@ GAMMA = 2.2
 DIM, BRIGHT = 8 / 255, 247 / 255
 """Colours beyond are black or burnt out, and tell nothing of the light."""
 
-LIGHT_SPREAD = 0.25
-"""How much photos' light differs, as the standard deviation of its logarithm."""
+EXPOSURE_SPREAD, TINT_SPREAD = 0.25, 0.06
+"""How much the light of photos differs, as standard deviations of its logarithm: of all channels,
+and of one against the others."""
 
-SHADE_SPREAD = 0.15
-"""Likewise, how much one place differs in two photos under one light: shades and IUV's faults."""
+SHADE_SPREAD, TWIN_SPREAD = 0.15, 0.2
+"""Likewise, how much one place differs in two photos under one light, by shades and IUV's faults;
+and how much a place differs from that on the other face of its limb."""
+
+TOLD_SHARE = 0.15
+"""Of a photo's best rating: what it sees worse tells nothing of the light."""
 
 COMMON_SHARE = 0.01
 """Of the texture: what two photos have in common is believed half where it is so large."""
@@ -118,6 +129,9 @@ def merge_views(views: Sequence[View]) -> MergedViews:
     seen = torch.cat([view.visibility for view in views])
     rating = torch.cat([view.rating for view in views])
     rating[0] *= LEAD
+    head = _mark_head(texture.shape[-1])
+    on_head = (rating * head).sum((1, 2, 3))
+    rating[on_head.argmax()] *= torch.where(head, FACE_LEAD, 1.0)
     cell = round(texture.shape[-1] * BAND_SHARE)
     colours, around = _smooth(texture, seen, cell)
     wide = _to_shares(_smooth(rating, torch.ones_like(seen), cell)[0] * (around > 0), WIDE)
@@ -128,6 +142,11 @@ def merge_views(views: Sequence[View]) -> MergedViews:
     return MergedViews(
         merged.clamp(-1, 1) * shown, shown, narrow[:, 0] * shown[0], find_strangers(views)
     )
+
+
+def _mark_head(size: int) -> Bool[Tensor, "T T"]:
+    part = load_uv_layout().part[None, None].float()
+    return torch.isin(F.interpolate(part, (size, size))[0, 0].long(), torch.tensor(HEAD))
 
 
 def _smooth(
@@ -150,29 +169,49 @@ def _to_shares(rating: Float[Tensor, "K 1 T T"], power: int) -> Float[Tensor, "K
 def equalise_light(views: Sequence[View]) -> list[View]:
     """Give all photos the exposure and white balance of the first, as far as they can be told.
 
-    Each channel of each photo has one factor of light. Those of two photos are compared by the
-    median of their ratio where both see the body; little in common moves little.
-    Source: gain compensation of Brown and Lowe (IJCV 2007), Sec. 6, of logarithms.
+    Each photo has one factor of light a channel. Two photos are compared by the median ratio of
+    what both show: the same places, and the other faces of the same limbs, as a front and a back
+    have hardly a place in common, but mostly the same clothes. Where ratios differ much among each
+    other they move little.
+    Source: gain compensation of Brown and Lowe (IJCV 2007), Sec. 6, of logarithms; twins are this
+    project's.
     """
     count = len(views)
-    light = [_to_light(view) for view in views]
-    # rows of a least squares problem: each photo's own light is near to the first's ...
-    rows = [np.eye(count)[1:] / LIGHT_SPREAD]
-    wanted = [np.zeros((count - 1, 3))]
+    logs = [_to_light(view).flatten(1).clamp_min(1e-6).log() for view in views]
+    told = [_told(view).flatten() for view in views]
+    size = views[0].texture.shape[-1]
+    layout = load_uv_layout()
+    side, depth = (resize_twins(twin, size) for twin in (layout.side_twin, layout.depth_twin))
+    same = torch.arange(size**2)
+    # rows of least squares problems: each photo's light is near to the first's ...
+    rows, wanted = [np.eye(count)[1:] / EXPOSURE_SPREAD], [np.zeros((count - 1, 3))]
     for one, other in combinations(range(count), 2):
-        common = _told(views[one], light[one]) & _told(views[other], light[other])
-        share = float(common.float().mean())
-        if not share:
-            continue
-        # ... and two photos agree where both see
-        ratio = (light[one][:, common].log() - light[other][:, common].log()).median(1).values
-        trust = (share / (share + COMMON_SHARE)) ** 0.5 / SHADE_SPREAD
-        row = np.zeros((1, count))
-        row[0, one], row[0, other] = trust, -trust
-        rows.append(row)
-        wanted.append(-trust * ratio.double().numpy()[None])
-    system = np.concatenate(rows)[:, 1:]  # the first photo's light stays
-    gains = np.linalg.lstsq(system, np.concatenate(wanted))[0]
+        for places, spread in (((same,), SHADE_SPREAD), ((depth, side[depth]), TWIN_SPREAD)):
+            both = [told[one] & told[other][place] for place in places]
+            ratios = torch.cat(
+                [
+                    logs[one][:, kept] - logs[other][:, place[kept]]
+                    for place, kept in zip(places, both, strict=True)
+                ],
+                dim=1,
+            )
+            share = ratios.shape[1] / size**2
+            if not share:
+                continue
+            # ... and two photos agree on what both show
+            ratio = ratios.median(1, keepdim=True).values
+            scatter = float((ratios - ratio).abs().median())
+            trust = (share / (share + COMMON_SHARE) / (spread**2 + scatter**2)) ** 0.5
+            row = np.zeros((1, count))
+            row[0, one], row[0, other] = trust, -trust
+            rows.append(row)
+            wanted.append(-trust * ratio.double().numpy().T)
+    system, found = np.concatenate(rows)[:, 1:], np.concatenate(wanted)  # the first's light stays
+    exposure = np.linalg.lstsq(system, found.mean(1, keepdims=True))[0]
+    # cameras differ less in white balance than in exposure
+    system[: count - 1] *= EXPOSURE_SPREAD / TINT_SPREAD
+    tint = np.linalg.lstsq(system, found - found.mean(1, keepdims=True))[0]
+    gains = exposure + tint
     return [views[0], *(_relight(view, gain) for view, gain in zip(views[1:], gains, strict=True))]
 
 
@@ -180,11 +219,11 @@ def _to_light(view: View) -> Float[Tensor, "3 T T"]:
     return ((view.texture[0] + 1) / 2).clamp_min(0) ** GAMMA
 
 
-def _told(view: View, light: Float[Tensor, "3 T T"]) -> Bool[Tensor, "T T"]:
+def _told(view: View) -> Bool[Tensor, "T T"]:
     """Where a photo tells of the light: inside its edges, neither black nor burnt out."""
-    rating = view.rating[0, 0]
-    kept = (light > DIM**GAMMA) & (light < BRIGHT**GAMMA)
-    return (rating > rating.max() * 0.25) & (view.visibility[0, 0] > 0) & kept.all(0)
+    rating, colours = view.rating[0, 0], (view.texture[0] + 1) / 2
+    kept = ((colours > DIM) & (colours < BRIGHT)).all(0)
+    return (rating > rating.max() * TOLD_SHARE) & (view.visibility[0, 0] > 0) & kept
 
 
 def _relight(view: View, gain: Float[np.ndarray, " 3"]) -> View:
