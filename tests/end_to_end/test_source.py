@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from motion_transfer.api import render_video
+from motion_transfer.preview.views import first_picture
 
 DIGITS = "0123456789abcdef"
 
@@ -137,6 +138,16 @@ def test_a_batch_takes_it(studio, mt, kept) -> None:
     )
     assert mt("batch", "run", manifest).code == 0
     np.testing.assert_array_equal(frames_of(studio.folder / "1"), frames_of(studio.folder / "2"))
+
+
+def test_the_preview_shows_it(studio, mt, kept) -> None:
+    np.testing.assert_array_equal(first_picture(kept), first_picture(studio.folder / "person.png"))
+    output = studio.folder / "frame.png"
+    arguments = ("--driver", studio.driver(2), "--renderer", "texture")
+    result = mt("preview", "--source", kept, *arguments, "--frame", "1", "-o", output)
+    assert (result.code, result.err) == (0, "")
+    assert mt("run", "--source", kept, *arguments, "-o", studio.folder / "run").code == 0
+    np.testing.assert_array_equal(Image.open(output), frames_of(studio.folder / "run")[1])
 
 
 def test_what_is_in_it(studio, mt, kept, checkpoint) -> None:
