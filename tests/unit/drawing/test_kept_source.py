@@ -23,9 +23,11 @@ from motion_transfer.drawing.kept_source import (
     load_source,
     save_source,
 )
-from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.renderers.network import open_recipe
+from motion_transfer.drawing.source import Source, undress
 from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import Photo
+from nhrr_core import load_uv_layout
 
 SIZE, COARSE, HEIGHT, WIDTH = 64, 16, 30, 20
 DIGEST, MAP = "ab" * 32, (1, 5, SIZE, SIZE)
@@ -87,6 +89,25 @@ def test_features_are_those_of_the_very_weights(kept: Path) -> None:
     assert load_features(kept, "cd" * 32, MAP) is None
     with pytest.raises(InputError, match=r"features/ab.* is F32 \[5, 64, 64\], where F32 6 x 64"):
         load_features(kept, DIGEST, (1, 6, SIZE, SIZE))
+
+
+def test_a_kept_feature_map_is_not_computed_again(tmp_path: Path, checkpoint: Path) -> None:
+    """But where garments, or parts taken away, have changed the source."""
+    recipe = open_recipe(checkpoint)
+    source = make_source()
+    marked = torch.full(recipe.appearance_of(source).shape, 7.0)
+    path = tmp_path / "me.mtsource"
+    save_source(path, [source], {recipe.content: marked}, {})
+    kept = load_source(path, SIZE)
+    np.testing.assert_array_equal(recipe.appearance_of(kept), marked)
+    bare = undress(kept, [2])
+    again = recipe.appearance_of(bare)
+    assert (again != 7).any()
+    np.testing.assert_array_equal(again, recipe.appearance_of(undress(source, [2])))
+    torso = load_uv_layout().part[2::4, 2::4] == 2  # the middles of texels of SIZE
+    assert kept.visibility[0, 0][torso].any()
+    assert not bare.visibility[0, 0][torso].any()
+    assert torch.equal(bare.texture[0][:, ~torso], kept.texture[0][:, ~torso])
 
 
 def test_the_same_source_gives_the_same_bytes(kept: Path, tmp_path: Path) -> None:
@@ -198,7 +219,7 @@ def test_files_of_other_kinds_and_times_are_told(kept: Path, checkpoint: Path) -
 
 
 @settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
 def test_no_damage_does_more_than_raise(kept: Path, data: st.DataObject) -> None:
