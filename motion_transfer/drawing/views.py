@@ -37,7 +37,7 @@ EDGE_SHARE = 0.02
 EDGE_TRUST = 0.05
 """What is left of that at the very edge: where no other photo sees the place, it still counts."""
 
-LEAD = 3.0
+LEAD = 1.5
 """The first photo is preferred to others that see a texel up to so many times as well."""
 
 FACE_LEAD = 4.0
