@@ -11,7 +11,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    create_model,
+)
 from pydantic_core import ErrorDetails
 
 from motion_transfer.errors import InputError
@@ -44,6 +52,17 @@ class GarmentEntry(BaseModel):
     iuv: str | None = Field(None, description="Its IUV; else STEM_IUV.png beside it.")
 
 
+def _one_or_several(value: Any) -> Any:
+    """Say in one line what pydantic says in one for each type of a union."""
+    paths = value if isinstance(value, list) else [value]
+    if not paths or not all(type(path) in (str, int, float) for path in paths):
+        raise ValueError("write a path, or a list of paths")
+    return value
+
+
+Paths = Annotated[str | Annotated[list[str], Field(min_length=1)], BeforeValidator(_one_or_several)]
+
+
 def _type_of(entry: Option) -> Any:
     if entry.choices:
         return Literal[entry.choices]
@@ -54,7 +73,7 @@ def _type_of(entry: Option) -> Any:
         "rate": str | float,
         "frames": str | int,
         "garments": list[GarmentEntry],
-        "paths": str | list[str],
+        "paths": Paths,
     }
     return kinds.get(entry.kind, str)
 
@@ -90,7 +109,6 @@ def _required(description: str) -> Any:
 
 
 PLACEHOLDERS = "{source}, {driver}: names without their endings; {index}: counts from 1"
-Source = str | Annotated[list[str], Field(min_length=1)]
 SEVERAL = "A list within shows one person, all the matches of its globs."
 OUTPUT = _required(f"Below the output root. With globs, a template of {PLACEHOLDERS}.")
 
@@ -104,7 +122,7 @@ JobEntry = create_model(
     **{
         **_fields(),
         "source": (
-            Source,
+            Paths,
             Field(description=f"As --source of `mt run`; a glob means each match. {SEVERAL}"),
         ),
         "driver": _required("As --driver of `mt run`; a glob means each match."),
@@ -120,7 +138,7 @@ MatrixEntry = create_model(
     **{
         **_fields(leave_out=("source", "driver")),
         "sources": (
-            list[Source],
+            list[Paths],
             Field(min_length=1, description=f"Photos; globs are allowed. {SEVERAL}"),
         ),
         "drivers": (list[str], Field(min_length=1, description="Drivers; globs are allowed.")),

@@ -77,7 +77,7 @@ def test_three_syntaxes_mean_the_same(tmp_path: Path) -> None:
         jobs_of(write(tmp_path, toml_text, ".toml")),
     ]
     assert got[0] == got[1] == got[2]
-    assert got[0][0].options.source == tmp_path / "a.png"
+    assert got[0][0].options.source == (tmp_path / "a.png",)
     assert got[0][0].options.frames == (3, 9)
 
 
@@ -107,6 +107,85 @@ def test_a_matrix_and_globs_spread(tmp_path: Path) -> None:
     ]
 
 
+def people_of(folder: Path, text: str) -> list[tuple[str, ...]]:
+    """The names of each job's photos."""
+    return [
+        tuple(path.relative_to(folder).as_posix() for path in job.options.source)
+        for job in jobs_of(write(folder, text))
+    ]
+
+
+def test_a_list_of_photos_is_one_person(tmp_path: Path) -> None:
+    """With IUV of their own, one for each; `{source}` is the first one's name."""
+    text = job_text(source="[front.png, /far/back.png]", output="'{source}.mp4'")
+    text = text.replace("front.png,", "front.png, 7,")  # a name that is a number to YAML
+    options = jobs_of(write(tmp_path, text))[0].options
+    assert options.source == (tmp_path / "front.png", tmp_path / "7", Path("/far/back.png"))
+    assert options.output == tmp_path / "front.mp4"
+    words = {"source": "[a.png, b.png]", "source_iuv": "[a.npy, b/iuv.png]"}
+    options = jobs_of(write(tmp_path, job_text(**words)))[0].options
+    assert options.sources == [
+        (tmp_path / "a.png", tmp_path / "a.npy"),
+        (tmp_path / "b.png", tmp_path / "b/iuv.png"),
+    ]
+
+
+def test_globs_in_a_list_are_photos_of_one_person(tmp_path: Path) -> None:
+    """In the order of the list, those of one glob by name, and without the IUV beside them."""
+    for name in ("b.png", "a.png", "a_IUV.png", "b_iuv.png", "c.jpg"):
+        (tmp_path / name).touch()
+    assert people_of(tmp_path, job_text(source="'*.png'", output="'{source}.mp4'")) == [
+        ("a.png",),
+        ("b.png",),
+    ]
+    assert people_of(tmp_path, job_text(source="[c.jpg, '*.png']")) == [("c.jpg", "a.png", "b.png")]
+    wrong = write(tmp_path, job_text(source="[c.jpg, '*.gif']"))
+    assert refusal(wrong).startswith(f"{wrong}:4: jobs[0].source: '*.gif' matches nothing")
+
+
+def test_a_list_within_a_matrix_is_one_person(tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        (tmp_path / name).touch()
+    text = (
+        "version: 1\nmatrix:\n  - sources: ['*.png', ['*.png'], [c.jpg, a.png]]\n"
+        "    drivers: [d, e]\n    output: '{index}_{source}.mp4'\n"
+    )
+    people = [("a.png",), ("b.png",), ("a.png", "b.png"), ("c.jpg", "a.png")]
+    assert people_of(tmp_path, text) == [one for one in people for _ in "de"]
+    outputs = [job.options.output.name for job in jobs_of(write(tmp_path, text))]
+    assert outputs[::2] == ["1_a.mp4", "3_b.mp4", "5_a.mp4", "7_c.mp4"]
+
+
+def test_every_photo_of_a_list_has_to_be_there(tmp_path: Path) -> None:
+    (tmp_path / "a.png").touch()
+    (tmp_path / "d").mkdir()
+    jobs = jobs_of(write(tmp_path, job_text(source="[a.png, gone.png]")))
+    assert list(check_inputs(jobs)) == [f"job 0 (a.mp4): source {tmp_path}/gone.png does not exist"]
+
+
+def test_the_schema_takes_one_photo_or_a_list() -> None:
+    """What editors check with; an empty list, or a list within a job's list, is none."""
+    jsonschema = pytest.importorskip("jsonschema")
+    published = json.loads((JOBS / "manifest.schema.json").read_text())
+    for sources, valid in (
+        (["a.png"], True),
+        ([["a.png", "b.png"], "c.png"], True),
+        ([[]], False),
+        ([], False),
+        ([[["a.png"]]], False),
+        ("a.png", False),
+    ):
+        entry = {"sources": sources, "drivers": ["d"], "output": "o"}
+        found = jsonschema.Draft202012Validator(published).is_valid(
+            {"version": 1, "matrix": [entry]}
+        )
+        assert found == valid, sources
+    for source, valid in (("a.png", True), (["a.png", "b"], True), ([], False), ([["a"]], False)):
+        entry = {"source": source, "driver": "d", "output": "o"}
+        found = jsonschema.Draft202012Validator(published).is_valid({"version": 1, "jobs": [entry]})
+        assert found == valid, source
+
+
 WRONG = {
     "field": ({"ouput": "x.mp4"}, "shoot.yaml:7: jobs[0].ouput: unknown field; did you mean outpu"),
     "choice": ({"size": "huge"}, "shoot.yaml:7: jobs[0].size: 'huge': Input should be 'driver', "),
@@ -118,6 +197,12 @@ WRONG = {
     ),
     "template": ({"output": "'{who}.mp4'"}, "shoot.yaml:6: jobs[0].output: '{who}.mp4' is no te"),
     "glob": ({"source": "'*.gif'"}, "shoot.yaml:4: jobs[0].source: '*.gif' matches nothing"),
+    "nobody": ({"source": "[]"}, "shoot.yaml:4: jobs[0].source: []: write a path, or a list of"),
+    "nested": ({"source": "[[a.png]]"}, "shoot.yaml:4: jobs[0].source: [['a.png']]: write a path"),
+    "iuv": (
+        {"source": "[a.png, b.png]", "source_iuv": "a.npy"},
+        "shoot.yaml:4: jobs[0]: 1 source IUV for 2 sources; give one for each, in their order",
+    ),
     "together": ({"renderer": "texture", "weights": "w"}, "shoot.yaml:4: jobs[0]: the texture r"),
     "ending": ({"output": "a.xyz"}, "shoot.yaml:4: jobs[0]: cannot write FOLDER/a.xyz: un"),
     "codec": ({"codec": "vp8"}, "shoot.yaml:4: jobs[0]: unknown codec 'vp8'; supported are h264"),
@@ -129,9 +214,9 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, case: str) -> None:
     words, message = WRONG[case]
-    assert refusal(write(tmp_path, job_text(**words))).startswith(
-        f"{tmp_path}/{message.replace('FOLDER', str(tmp_path))}"
-    )
+    said = refusal(write(tmp_path, job_text(**words)))
+    assert said.startswith(f"{tmp_path}/{message.replace('FOLDER', str(tmp_path))}")
+    assert "\n" not in said
 
 
 def test_settings_are_checked(tmp_path: Path) -> None:
