@@ -18,7 +18,6 @@ from motion_transfer.batch.expand import Job
 from motion_transfer.batch.state import BatchState
 from motion_transfer.errors import InputError
 from motion_transfer.media.publish import explain_disk_errors
-from motion_transfer.render.options import is_kept
 from motion_transfer.version import __version__
 
 REPORT_FORMAT = "batch-report-1"
@@ -39,9 +38,9 @@ def write_posters(source: Path, output: Path, stem: Path) -> bool:
     """
     import cv2
 
-    from motion_transfer.drawing.kept_source import load_picture
     from motion_transfer.media.pictures.photo import read_photo, write_png
     from motion_transfer.media.pictures.video import IndexedVideo
+    from motion_transfer.render.source_pictures import first_picture
 
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
@@ -53,8 +52,7 @@ def write_posters(source: Path, output: Path, stem: Path) -> bool:
         else:
             video = IndexedVideo(output)
             middle = video.read(video.frame_count // 2)
-        photo = load_picture(source).photo if is_kept(source) else read_photo(source)
-        for name, rgb in zip(PICTURES, (photo.rgb, middle), strict=True):
+        for name, rgb in zip(PICTURES, (first_picture(source), middle), strict=True):
             scale = min(1, POSTER_PX / max(rgb.shape[:2]))
             size = (max(1, round(rgb.shape[1] * scale)), max(1, round(rgb.shape[0] * scale)))
             small = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)

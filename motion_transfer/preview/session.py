@@ -32,7 +32,6 @@ from motion_transfer.preview.rendering import Rendering, explain
 from motion_transfer.preview.views import (
     Views,
     count_people,
-    first_picture,
     read_proxy,
     shrink,
     write_proxies,
@@ -47,6 +46,7 @@ from motion_transfer.render.inputs import (
     photo_files,
 )
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions, is_kept, parse_window
+from motion_transfer.render.source_pictures import first_picture
 
 CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's
 SHOWN_AS_IS = ("renderer", "background", "person", "driver_person")

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.canvas import Canvas, Frame, colour_iuv
-from motion_transfer.drawing.kept_source import load_picture
 from motion_transfer.drawing.person import find_people
 from motion_transfer.drawing.renderers.interface import Recipe, Renderer
 from motion_transfer.drawing.source import Source
@@ -26,8 +25,7 @@ from motion_transfer.option import part_of
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.render.composition import make_canvas, open_recipe
 from motion_transfer.render.driver import open_driver
-from motion_transfer.render.inputs import is_clip, list_source_photos
-from motion_transfer.render.options import RendererOptions, RenderOptions, SourceOptions, is_kept
+from motion_transfer.render.options import RendererOptions, RenderOptions, SourceOptions
 from motion_transfer.render.source import read_source
 
 KEPT = 4  # results of each step: some options back and forth without waiting
@@ -151,20 +149,6 @@ def write_frame(options: RenderOptions, index: int, output: Path) -> None:
         picture = Views().result(options, driver, plan_frames(driver, options), index)
         write_png(folder / "frame.png", picture)
         publish(folder / "frame.png", output)
-
-
-def first_picture(source: Path) -> Frame:
-    """Show a photo, or the first picture of a folder, video or kept source. Raises: InputError."""
-    if is_kept(source):
-        return load_picture(source).photo.on_white()
-    if source.is_dir():
-        return read_photo(list_source_photos(source)[0]).on_white()
-    if not is_clip(source):
-        return read_photo(source).on_white()
-    picture = next(open_pictures(source).read(), None)
-    if picture is None:
-        raise InputError(f"{source} holds no pictures")
-    return picture
 
 
 def shrink(picture: Frame) -> Frame:

@@ -79,6 +79,20 @@ def read_pictures(
     return found
 
 
+def first_picture(source: Path) -> UInt8[np.ndarray, "H W 3"]:
+    """Show a photo, or the first picture of a folder, video or kept source. Raises: InputError."""
+    if is_kept(source):
+        return load_picture(source).photo.on_white()
+    if source.is_dir():
+        return read_photo(list_source_photos(source)[0]).on_white()
+    if not is_clip(source):
+        return read_photo(source).on_white()
+    picture = next(open_pictures(source).read(), None)
+    if picture is None:
+        raise InputError(f"{source} holds no pictures")
+    return picture
+
+
 def find_person(
     photo: Photo,
     iuv_path: Path | None,

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from motion_transfer.api import render_video
-from motion_transfer.preview.views import first_picture
+from motion_transfer.render.source_pictures import first_picture
 
 DIGITS = "0123456789abcdef"
 
