@@ -178,6 +178,14 @@ def test_white_balance_comes_nearer_to_the_first(light: tuple[float, ...]) -> No
     assert apart(equalise_light([first, other])[1], first) < 0.9 * apart(other, first)
 
 
+def test_photos_are_merged_under_one_light() -> None:
+    """What the second photo alone sees is no darker for that."""
+    other, truth = view(seen=RIGHT, light=DARKER), view(seen=RIGHT)
+    merged = merge_views([view(seen=LEFT), other])
+    found = View("merged", merged.texture, merged.visibility, merged.visibility)
+    assert apart(found, truth, ~LEFT) < 0.5 * apart(other, truth, ~LEFT)
+
+
 def test_light_is_told_along_a_chain_of_photos() -> None:
     """Front and back have nothing in common but what a photo from the side shows of both."""
     front, back = torch.isin(PART, torch.tensor([23])), torch.isin(PART, torch.tensor([5, 6]))
@@ -199,7 +207,7 @@ def test_a_back_takes_the_light_of_a_front_in_the_same_clothes() -> None:
     )
     first, other, truth = view(seen=front), view(seen=back, light=DARKER), view(seen=back)
     after = equalise_light([first, other])[1]
-    assert apart(after, truth, back) < 0.7 * apart(other, truth, back)
+    assert apart(after, truth, back) < 0.5 * apart(other, truth, back)
 
 
 def test_burnt_out_and_black_places_tell_nothing_of_the_light() -> None:
@@ -290,7 +298,7 @@ def test_edges_rate_lower_than_what_lies_within(studio) -> None:
     whole, half = rate_texels(rgb, iuv), rate_texels(rgb, hidden)
     both = (whole > 0) & (half > 0)
     ratio = half[both] / whole[both]
-    assert float(ratio.min()) < 0.6
+    assert float(ratio.min()) < 0.4
     assert 0.8 < float(ratio.median()) < 1.2
 
 
