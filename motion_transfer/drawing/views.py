@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, Float32, UInt8
+from jaxtyping import Bool, Float, Float32, Int64, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.person import bounding_box
@@ -43,6 +43,12 @@ LEAD = 1.5
 FACE_LEAD = 4.0
 """One photo gives the head, as far as it sees it: a face mixed from several has double features."""
 
+SURE_SHARE = 0.3
+"""Of a photo's best rating on a part of the body: what all but the first see worse is left out."""
+
+EARS_METRES = 0.02
+"""What lies farther ahead on the head is the face; see `UVLayout.position`."""
+
 WIDE, NARROW = 4, 8
 """Powers of the ratings by which colours, and patterns on them, are mixed."""
 
@@ -68,6 +74,9 @@ TOLD_SHARE = 0.15
 
 COMMON_SHARE = 0.01
 """Of the texture: what two photos have in common is believed half where it is so large."""
+
+LEAST_SHARE = 0.002
+"""Likewise: less in common tells nothing."""
 
 STRANGER = 0.12
 """Colours of one person in two photos differ less than that, of 1, once their light is the same."""
@@ -124,14 +133,15 @@ def merge_views(views: Sequence[View]) -> MergedViews:
     if len(views) == 1:
         only = views[0]
         return MergedViews(only.texture, only.visibility, only.visibility[0])
-    views = equalise_light(views)
+    first, *others = equalise_light(views)
+    views = [first, *map(_keep_sure, others)]
     texture = torch.cat([view.texture for view in views])
     seen = torch.cat([view.visibility for view in views])
     rating = torch.cat([view.rating for view in views])
     rating[0] *= LEAD
-    head = _mark_head(texture.shape[-1])
-    on_head = (rating * head).sum((1, 2, 3))
-    rating[on_head.argmax()] *= torch.where(head, FACE_LEAD, 1.0)
+    head, face = _mark_head(texture.shape[-1])
+    on_face = (rating * face).sum((1, 2, 3))
+    rating[on_face.argmax()] *= torch.where(head, FACE_LEAD, 1.0)
     cell = round(texture.shape[-1] * BAND_SHARE)
     colours, around = _smooth(texture, seen, cell)
     wide = _to_shares(_smooth(rating, torch.ones_like(seen), cell)[0] * (around > 0), WIDE)
@@ -144,9 +154,27 @@ def merge_views(views: Sequence[View]) -> MergedViews:
     )
 
 
-def _mark_head(size: int) -> Bool[Tensor, "T T"]:
+def _keep_sure(view: View) -> View:
+    """Leave out what a photo sees much worse than the best of the same part: hands, backdrop."""
+    part = _parts(view.texture.shape[-1])
+    rating = view.rating.flatten()
+    best = torch.zeros(int(part.max()) + 1).scatter_reduce(0, part.flatten(), rating, "amax")
+    sure = (view.rating >= SURE_SHARE * best[part]) * view.visibility
+    return replace(view, texture=view.texture * sure, visibility=sure, rating=view.rating * sure)
+
+
+def _parts(size: int) -> Int64[Tensor, "T T"]:
     part = load_uv_layout().part[None, None].float()
-    return torch.isin(F.interpolate(part, (size, size))[0, 0].long(), torch.tensor(HEAD))
+    return F.interpolate(part, (size, size))[0, 0].long()
+
+
+def _mark_head(size: int) -> tuple[Bool[Tensor, "T T"], Bool[Tensor, "T T"]]:
+    """Mark the texels of the head, and those of its face."""
+    layout = load_uv_layout()
+    head = torch.isin(layout.part, torch.tensor(HEAD))
+    both = torch.stack([head, head & (layout.position[..., 2] > EARS_METRES)])
+    head, face = F.interpolate(both[None].float(), (size, size))[0] > 0
+    return head, face
 
 
 def _smooth(
@@ -196,7 +224,7 @@ def equalise_light(views: Sequence[View]) -> list[View]:
                 dim=1,
             )
             share = ratios.shape[1] / size**2
-            if not share:
+            if share < LEAST_SHARE:  # the few twins of head and trunk are skin and shirt
                 continue
             # ... and two photos agree on what both show
             ratio = ratios.median(1, keepdim=True).values
