@@ -62,7 +62,7 @@ class AdaptationSettings:
         seed: Of whatever is left to chance.
     """
 
-    steps: int = 240
+    steps: int = 360
     learning_rate: float = 5e-4
     held_every: int = 4
     held_poses: int = 8

@@ -60,9 +60,13 @@ def damage_checkpoint(studio, checkpoint: Path) -> Path:
 # name: what is done to a good run, which may add arguments; what the message says
 CASES: dict[str, tuple[Callable | list[str], str]] = {
     "source missing": (["--source", "nobody.png"], r"source nobody\.png does not exist"),
-    "source is a folder": (
+    "source is a folder of no photos": (
         lambda s: ["--source", s.folder / "driver"],
-        "is a folder; name a file in it",
+        r"no IUV found for .*driver/frame_",
+    ),
+    "sources and their IUV are not as many": (
+        lambda s: ["--source", s.folder / "person.png", "--source-iuv", s.folder / "person.png"],
+        "1 source IUV for 2 sources; give one for each",
     ),
     "source is no picture": (
         lambda s: (s.folder / "person.png").write_text("words"),

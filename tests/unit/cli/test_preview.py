@@ -19,7 +19,7 @@ from motion_transfer.cli.preview import _options_of_words
     ],
 )
 def test_the_output_is_named_by_source_and_driver(driver: str, output: str) -> None:
-    words = {"source": "in/anna.png", "driver": driver, "output": None}
+    words = {"source": ("in/anna.png",), "driver": driver, "output": None}
     assert _options_of_words(words).output == Path(output)
     assert _options_of_words({**words, "output": "out/x.gif"}).output == Path("out/x.gif")
 
