@@ -12,7 +12,7 @@ import torch
 import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float32, UInt8
 
-from motion_transfer.drawing.views import View, merge_views
+from motion_transfer.drawing.views import EARS_METRES, HEAD, View, merge_views
 from nhrr_core import load_uv_layout
 from nhrr_core.uv_layout import TWIN_SIZE
 
@@ -54,12 +54,14 @@ class Coverage:
         quality: 256 x 256, how well the texel is seen by the photo that sees it best: 1 is well,
             less is coarse or blurred; 0 where none sees it.
         area: 256 x 256, of each texel as a share of the body's surface.
+        strangers: As those of `MergedViews`.
     """
 
     names: tuple[str, ...]
     shares: Float[np.ndarray, "S T T"]
     quality: Float[np.ndarray, "T T"]
     area: Float[np.ndarray, "T T"]
+    strangers: tuple[int, ...] = ()
 
     def of(self, where: Bool[np.ndarray, "T T"]) -> tuple[float, float]:
         """Tell which share of a region is seen, and how well what is seen of it, on average."""
@@ -98,14 +100,14 @@ def measure_coverage(views: Sequence[View]) -> Coverage:
         [shares[[i for i, view in enumerate(views) if view.name == name]].sum(0) for name in names]
     )
     rating = F.adaptive_max_pool2d(torch.cat([view.rating for view in views]), size).amax((0, 1))
-    return Coverage(names, own.numpy(), rating.numpy() / WELL, _measure_area())
+    return Coverage(names, own.numpy(), rating.numpy() / WELL, _measure_area(), merged.strangers)
 
 
 def regions() -> dict[str, Bool[np.ndarray, "T T"]]:
     """Name parts of the body as people do, each with its texels."""
     layout = load_uv_layout()
     part = layout.part.numpy()
-    ahead = layout.position.numpy()[..., 2] > 0.02  # metres: in front of the ears
+    ahead = layout.position.numpy()[..., 2] > EARS_METRES
     parts = {
         "front of the trunk": (2,),
         "back of the trunk": (1,),
@@ -116,7 +118,7 @@ def regions() -> dict[str, Bool[np.ndarray, "T T"]]:
         "hands": (3, 4),
         "feet": (5, 6),
     }
-    head = np.isin(part, (23, 24))
+    head = np.isin(part, HEAD)
     return {"face": head & ahead, "back of the head": head & ~ahead} | {
         name: np.isin(part, numbers) for name, numbers in parts.items()
     }

@@ -23,7 +23,7 @@ from motion_transfer.drawing.person import (
     isolate,
     occupancy,
 )
-from motion_transfer.drawing.views import MergedViews, View, merge_views, rate_texels
+from motion_transfer.drawing.views import View, merge_views, rate_texels
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import ChannelOrder
@@ -102,7 +102,7 @@ def unfold_source(
     merged = merge_views(unfold_views(pictures, texture_size))
     person = pictures[0]
     notes = [note for picture in pictures for note in _list_notes(picture)]
-    notes += tell_strangers(pictures, merged)
+    notes += tell_strangers(pictures, merged.strangers)
     return Source(
         person.photo,
         person.iuv,
@@ -190,12 +190,12 @@ def unfold_views(
     return views
 
 
-def tell_strangers(pictures: Sequence[SourcePicture], merged: MergedViews) -> list[str]:
+def tell_strangers(pictures: Sequence[SourcePicture], strangers: Sequence[int]) -> list[str]:
     """Say which photos do not seem to show the person of the first."""
     return [
         f"{pictures[index].photo.path} seems to show somebody else than {pictures[0].photo.path},"
         " or other clothes; leave it out if it does"
-        for index in merged.strangers
+        for index in strangers
     ]
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 from motion_transfer.drawing.coverage import draw_coverage, measure_coverage, regions
 from motion_transfer.drawing.source import tell_strangers, unfold_views
-from motion_transfer.drawing.views import merge_views
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.events import Listener
 from motion_transfer.media.pictures.photo import write_png
@@ -49,7 +48,7 @@ def describe_source(
             publish(place / "coverage.png", picture)
     told = {name: coverage.of(where) for name, where in regions().items()}
     wanting = coverage.wanting()
-    notes = tell_strangers(pictures, merge_views(views))
+    notes = tell_strangers(pictures, coverage.strangers)
     return {
         "what": f"source of {len(pictures)} picture{'s' * (len(pictures) > 1)}",
         "body seen": f"{coverage.seen:.0%}",
