@@ -12,17 +12,9 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
+from nhrr_core.config import CLEARANCE_SIZE, UNIT_TEXELS
 from nhrr_core.texture import extract_texture
 from nhrr_core.uv_layout import texture_coordinates
-
-CLEARANCE_SIZE = 128
-"""Side of the clearance's texture, texels. Few will do: it is known along outlines only."""
-
-UNIT_TEXELS = 4.0
-"""A clearance of 1, in texels of CLEARANCE_SIZE: about the thickness of clothes."""
-
-UNIT_PIXELS = 8.0
-"""A clearance of 1 as RenderNet is told it, in pixels of its image."""
 
 
 def unfold_clearance(

@@ -15,6 +15,30 @@ COLOUR_CHANNELS = IUV_CHANNELS = 3
 POSITION_CHANNELS = 3  # x, y, z on the body in T-pose
 CLEARANCE_CHANNELS = 2  # the clearance, and whether any is known
 
+CLEARANCE_SIZE = 128
+"""Side of the clearance's texture, texels. Few will do: it is known along outlines only."""
+
+UNIT_TEXELS = 4.0
+"""A clearance of 1, in texels of CLEARANCE_SIZE: about the thickness of clothes."""
+
+UNIT_PIXELS = 8.0
+"""A clearance of 1 as RenderNet is told it, in pixels of its image."""
+
+MARGIN_LEVELS = 5
+"""Colours reach at least 16 pixels beyond the body, and 48 at most: loose clothes and hair."""
+
+OUTLINE_PIXELS = 24
+"""RenderNet is told distances to the outline up to this; clothes and hair seldom reach further."""
+
+FILL_FROM, FILL_TO = 32, 64
+"""How many places along a side of the texture colours are spread from, and how many to."""
+
+FILL_METRES = 0.02
+"""Distances on the body below this count about alike."""
+
+PLACE_METRES = 0.12
+"""Texels of a place lie within that of its middle on the body, unless they are of another part."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModelConfig:

@@ -7,14 +7,18 @@ import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
-from nhrr_core.clearance import (
+from nhrr_core.clearance import pixels_per_texel, spread_clearance
+from nhrr_core.config import (
+    CLEARANCE_CHANNELS,
     CLEARANCE_SIZE,
+    COLOUR_CHANNELS,
+    MARGIN_LEVELS,
+    OUTLINE_PIXELS,
+    POSITION_CHANNELS,
     UNIT_PIXELS,
     UNIT_TEXELS,
-    pixels_per_texel,
-    spread_clearance,
+    ModelConfig,
 )
-from nhrr_core.config import CLEARANCE_CHANNELS, COLOUR_CHANNELS, POSITION_CHANNELS, ModelConfig
 from nhrr_core.errors import ShapeError
 from nhrr_core.feature_net import FeatureNet
 from nhrr_core.iuv import normalise_iuv
@@ -28,12 +32,6 @@ from nhrr_core.texture import (
     shrink_texture,
 )
 from nhrr_core.uv_layout import load_uv_layout
-
-MARGIN_LEVELS = 5
-"""Colours reach at least 16 pixels beyond the body, and 48 at most: loose clothes and hair."""
-
-OUTLINE_PIXELS = 24
-"""RenderNet is told distances to the outline up to this; clothes and hair seldom reach further."""
 
 
 class NeuralReRenderer(nn.Module):

@@ -13,30 +13,17 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int64, UInt8
 from torch import Tensor
 
+from nhrr_core.config import FILL_FROM, FILL_METRES, FILL_TO, PLACE_METRES
 from nhrr_core.errors import ShapeError
 from nhrr_core.iuv import check_iuv
-from nhrr_core.uv_layout import CHART_SIZE, chart_index, texture_coordinates
-
-MAX_CHART_STEP = 0.15
-"""Neighbouring pixels whose U or V, in [0, 1], differ by more lie on separate pieces of surface."""
-
-MAX_STRETCH = 1 / 16
-"""Neighbours that land further apart in the texture, as a share of its side, do so, too."""
-
-MAX_ENTRY_STEP = 0.03
-"""Neighbouring entries of the lookup table further apart lie on two sides of a texture seam."""
-
-SAMPLES_PER_TEXEL = 3.0
-"""How dense points fill between pixels along each axis: no texel is missed where charts bend."""
-
-FILL_FROM, FILL_TO = 32, 64
-"""How many places along a side of the texture colours are spread from, and how many to."""
-
-FILL_METRES = 0.02
-"""Distances on the body below this count about alike."""
-
-PLACE_METRES = 0.12
-"""Texels of a place lie within that of its middle on the body, unless they are of another part."""
+from nhrr_core.uv_layout import chart_index, texture_coordinates
+from nhrr_core.uv_tables import (
+    CHART_SIZE,
+    MAX_CHART_STEP,
+    MAX_ENTRY_STEP,
+    MAX_STRETCH,
+    SAMPLES_PER_TEXEL,
+)
 
 
 def extract_texture(

@@ -9,7 +9,7 @@ Two inputs, neither of which is needed at run time:
   surface its chart (1..24), the chart coordinates of its corners, and the SMPL vertices they are;
 * an SMPL-topology body as OBJ with the SMPL texture coordinates, in T-pose, y up, z forward.
 
-Five tables come out (see `nhrr_core.uv_layout` for how they are read):
+Five tables come out (see `nhrr_core.uv_tables` for how they are read):
 
 * `charts` (24, 256, 256, 2): [part - 1, V * 255, U * 255] -> texture (x, y) in [0, 1], y down;
 * `side_twin`, `depth_twin` (256, 256): texel -> the texel that shows the same place of the body

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32, UInt8
 
 from motion_transfer.drawing.views import EARS_METRES, HEAD, View, merge_views
 from nhrr_core import load_uv_layout
-from nhrr_core.uv_layout import TWIN_SIZE
+from nhrr_core.uv_tables import TWIN_SIZE
 
 WELL = 1.0
 """A texel is seen well by so many pixels along its side, see `View.rating`."""

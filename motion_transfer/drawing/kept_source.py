@@ -38,8 +38,8 @@ from motion_transfer.media.structured import parse_json, shown
 from motion_transfer.version import __version__
 from motion_transfer.weights.tensors import first_line
 from nhrr_core import shrink_texture
-from nhrr_core.clearance import CLEARANCE_SIZE
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.config import CLEARANCE_SIZE
+from nhrr_core.parts import PART_COUNT
 
 FACTS = "kept_source"
 """The only key of the metadata: several would come in another order in every file."""

@@ -12,8 +12,7 @@ from motion_transfer.drawing.person import COVERS, bounding_box, disc, occupancy
 from motion_transfer.media.nearest import nearest_pixels
 from motion_transfer.media.pictures.photo import Photo
 from nhrr_core import load_uv_layout, unfold_clearance
-from nhrr_core.clearance import CLEARANCE_SIZE
-from nhrr_core.config import CLEARANCE_CHANNELS
+from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE
 
 ROOM_SHARE = 0.25  # of the body's longer side: nobody's clothes reach further
 WORKING_SIDE = 256  # px of the body's longer side: more would not show on CLEARANCE_SIZE texels

@@ -31,7 +31,7 @@ from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.media.nearest import take_nearest
 from motion_transfer.media.pictures.photo import Photo
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
-from nhrr_core.iuv import ALL_PARTS, PART_NAMES
+from nhrr_core.parts import ALL_PARTS, PART_NAMES
 
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
 CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that

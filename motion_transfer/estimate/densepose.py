@@ -31,7 +31,7 @@ from motion_transfer.estimate.interface import PersonEstimate, check_frame
 from motion_transfer.estimate.models import digest
 from motion_transfer.media.files import read_bytes
 from motion_transfer.weights.tensors import check_weights
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.parts import PART_COUNT
 
 LOWEST_SCORE = 0.8  # detectron2's own default where it draws people
 FARTHEST = 4  # longer sides of a picture that a box may reach away from its corner

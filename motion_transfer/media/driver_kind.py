@@ -22,7 +22,7 @@ from motion_transfer.media.iuv.formats import DriverKind, find_iuv_format
 from motion_transfer.media.iuv.lookalikes import explain_picture, explain_scaled_uv
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, list_photos, open_pictures
 from motion_transfer.media.pictures.photo import read_photo
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.parts import PART_COUNT
 
 LOOKED_AT = 48
 """How many frames are looked at until one says what the driver is: clips fade in."""

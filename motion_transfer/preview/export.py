@@ -13,7 +13,7 @@ from motion_transfer.media.iuv.formats import names_file
 from motion_transfer.option import Option, list_options
 from motion_transfer.render.options import NO_AUDIO, Garment, RenderOptions
 from motion_transfer.weights import SHIPPED
-from nhrr_core.iuv import PART_NAMES
+from nhrr_core.parts import PART_NAMES
 
 NAMES = ("audio", NO_AUDIO), *(("weights", name) for name in SHIPPED)
 """Options and words that stand in a path's place and are none."""

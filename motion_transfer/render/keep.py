@@ -17,7 +17,7 @@ from motion_transfer.render.content import picture_facts
 from motion_transfer.render.inputs import model_files, photo_files
 from motion_transfer.render.options import KEPT_SUFFIX, KeepOptions, SourceOptions, is_kept
 from motion_transfer.render.source import check_photos, read_sources
-from nhrr_core.iuv import PART_NAMES
+from nhrr_core.parts import PART_NAMES
 
 
 def keep_source(options: KeepOptions, output: Path, listener: Listener = ignore) -> None:

@@ -498,7 +498,7 @@ def parse_window(text: str) -> tuple[int, int, int] | None:
 
 def parse_parts(text: str) -> tuple[int, ...]:
     """Read a comma-separated list of part or group names as part numbers. Raises: InputError."""
-    from nhrr_core.iuv import PART_GROUPS, PART_NAMES
+    from nhrr_core.parts import PART_GROUPS, PART_NAMES
 
     names = {name: (index,) for index, name in enumerate(PART_NAMES) if index}
     names |= PART_GROUPS

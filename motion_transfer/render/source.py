@@ -11,7 +11,7 @@ from motion_transfer.events import Listener, ignore
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.render.options import Garment, SourceOptions
 from motion_transfer.render.source_pictures import find_person, read_pictures
-from nhrr_core.iuv import ALL_PARTS
+from nhrr_core.parts import ALL_PARTS
 
 SMALLEST_VISIBLE_SHARE = 0.01  # of the texels; a frontal half-length portrait shows about 0.2
 

@@ -39,7 +39,7 @@ from motion_transfer.media.pictures.photo import Photo, read_photo
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.render.inputs import find_source_iuv, is_clip, list_source_photos
 from motion_transfer.render.options import EstimatorOptions, SourceOptions, is_kept
-from nhrr_core.iuv import ALL_PARTS
+from nhrr_core.parts import ALL_PARTS
 
 ROOM_SHARE = 0.3
 """Of the person's longer side: around them, pictures are looked at no farther than that."""

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from motion_transfer.drawing.person import bounding_box
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.parts import PART_COUNT
 
 # all chosen by eye
 BORDER_PX = 2  # how far a border may be put back; more could wear thin limbs away

@@ -25,7 +25,7 @@ from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.samples import cut_target
 from motion_transfer.training.sources import StreamedPairs, StreamedPhoto
 from motion_transfer.training.speed import keep_memory
-from nhrr_core.iuv import ALL_PARTS
+from nhrr_core.parts import ALL_PARTS
 
 MOST_SKIPPED = 5
 """More people than these who cannot be painted are no accident any more; chosen."""

@@ -20,7 +20,7 @@ from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.painters import PaintedPerson, Painters
 from motion_transfer.training.samples import UNKNOWN_CLEARANCE, background_colour
 from nhrr_core import extract_texture, load_uv_layout
-from nhrr_core.clearance import CLEARANCE_SIZE
+from nhrr_core.config import CLEARANCE_SIZE
 
 FIRST_PEOPLE, FIRST_OF_BATCH = 32, 4
 """So many, or so many for each of a batch if that is less, are there before the first step: enough

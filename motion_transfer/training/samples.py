@@ -33,9 +33,8 @@ from motion_transfer.training.config import DataSettings, SpeedSettings, TrainCo
 from motion_transfer.training.pairs import Pair, Pairs, flat_stem
 from motion_transfer.training.pictures import Image, PersonPicture, Picture, Plane, lay_over
 from nhrr_core import shrink_texture
-from nhrr_core.clearance import CLEARANCE_SIZE
-from nhrr_core.config import CLEARANCE_CHANNELS
-from nhrr_core.iuv import ALL_PARTS
+from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE
+from nhrr_core.parts import ALL_PARTS
 
 BEYOND_THE_PHOTO = (255, 255, 255)  # as the renderer's default background
 UNKNOWN_CLEARANCE = 0.15

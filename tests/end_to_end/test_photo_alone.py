@@ -18,7 +18,7 @@ from motion_transfer.estimate.models import MODEL_FILES, find_model
 from motion_transfer.extras import require_extra
 from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.training.iuv.trainer import OTHER_SIDE, score_iuv
-from nhrr_core.iuv import PART_NAMES
+from nhrr_core.parts import PART_NAMES
 
 ASTRONAUT = Path(str(files("motion_transfer.demo") / "astronaut.jpg"))
 FACE = (slice(60, 130), slice(185, 260))

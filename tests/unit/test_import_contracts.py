@@ -65,7 +65,7 @@ def test_the_contracts_hold(copy: Path) -> None:
         ("motion_transfer/cli/run.py", "import av"),
         ("motion_transfer/preview/views.py", "import imageio.v3"),
         ("motion_transfer/media/iuv/stream.py", "import motion_transfer.media.iuv.dump"),
-        ("nhrr_core/texture.py", "import numpy"),
+        ("nhrr_core/texture.py", "import cv2"),
         ("nhrr_core/config.py", "import motion_transfer.errors"),
     ],
 )

@@ -20,8 +20,8 @@ from torch import Tensor
 from motion_transfer.drawing.renderers.interface import Appearance, Occupied
 from motion_transfer.drawing.source import Source
 from nhrr_core import PART_GROUPS, UVLayout, load_uv_layout, mirror_texture, sample_features
-from nhrr_core.iuv import PART_COUNT
-from nhrr_core.uv_layout import CHART_SIZE, TWIN_SIZE
+from nhrr_core.parts import PART_COUNT
+from nhrr_core.uv_tables import CHART_SIZE, TWIN_SIZE
 
 TEXTURE_SIZE = 256
 NEIGHBOURS = 12  # seen texels that a hidden one is mixed from; chosen by eye

@@ -32,7 +32,7 @@ from motion_transfer.estimate.iuv.features import (
 )
 from motion_transfer.media.structured import parse_json
 from motion_transfer.weights.tensors import load_network, read_header
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.parts import PART_COUNT
 
 PARTS = PART_COUNT + 1  # and the background
 FINER = 2  # output pixels a cell and side

@@ -33,7 +33,7 @@ from motion_transfer.media.iuv.dump_file import (
     read_dump_file,
 )
 from motion_transfer.media.iuv.stream import IuvStream, Raw
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.parts import PART_COUNT
 
 LOWEST_SCORE = 0.8  # `apply_net.py show` draws no detection below it; a dump holds them all
 NOBODY = np.zeros((0, 4))  # boxes of

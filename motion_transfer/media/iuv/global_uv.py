@@ -2,7 +2,7 @@
 
 Coordinate-based inpainting (Grigorev et al., CVPR 2019; "CBI") keeps a pose as one `.npy` for each
 picture: H x W x 2 floats (x, y) in [-1, 1], x to the right and y down in the texture, NaN where
-nobody is. It is the chart lookup of `nhrr_core.uv_layout` applied to an IUV image, and nothing in
+nobody is. It is the chart lookup of `nhrr_core.uv_tables` applied to an IUV image, and nothing in
 it says which of the 24 charts a place came from.
 
 The way back is the nearest entry of the same table. An IUV image that was folded with this very
@@ -22,7 +22,7 @@ from jaxtyping import Float, UInt8
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.errors import IuvFileError
-from nhrr_core.uv_layout import TWIN_SIZE, load_uv_layout
+from nhrr_core.uv_tables import TWIN_SIZE, load_uv_tables
 
 WORD = 65535  # the table's coordinates are 16-bit
 ROUNDING = 1e-6  # how far beyond 1 floats may come to lie that were computed, not measured
@@ -75,7 +75,7 @@ def check_scale(places: Frame, where: str) -> None:
 @cache
 def _nearest_entries() -> tuple[cKDTree, UInt8[np.ndarray, "N 3"]]:
     """Index the places of all table entries that a surface covers, with their (I, U, V)."""
-    charts = load_uv_layout().charts.numpy()
+    charts = load_uv_tables().charts
     words = np.round(charts * WORD).astype(np.int64)
     keys = words[..., 0] << 16 | words[..., 1]
     _, group, sizes = np.unique(keys, return_inverse=True, return_counts=True)

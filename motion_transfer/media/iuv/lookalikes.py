@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.parts import PART_COUNT
 
 COLOUR_MAPS = {
     "Viridis": cv2.COLORMAP_VIRIDIS,

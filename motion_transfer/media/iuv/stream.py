@@ -20,7 +20,7 @@ from jaxtyping import UInt8
 from motion_transfer.errors import IuvFileError
 from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.lookalikes import explain_picture, explain_scaled_uv
-from nhrr_core.iuv import PART_COUNT
+from nhrr_core.parts import PART_COUNT
 
 OVERSHOOT = 32
 """Bicubic and Lanczos interpolation run beyond what lies at a border, by up to a quarter of it."""

@@ -11,7 +11,7 @@ import pytest
 from motion_transfer.drawing.outline import clearance_of, measure_clearance, stand_out
 from motion_transfer.drawing.person import disc
 from motion_transfer.media.pictures.photo import Photo
-from nhrr_core.iuv import ALL_PARTS
+from nhrr_core.parts import ALL_PARTS
 
 COAT = (60, 20, 20)
 
