@@ -183,7 +183,9 @@ def measure_surroundings(position: Float[Tensor, "256 256 3"]) -> Float[Tensor, 
         position: That of `UVLayout`, in metres.
     """
     given, wanted = (_places(position, count).reshape(-1, 3) for count in (FILL_FROM, FILL_TO))
-    squared = torch.cdist(given, wanted).square()
+    # by differences: products of matrices lose the small distances
+    exact = "donot_use_mm_for_euclid_dist"
+    squared = torch.cdist(given, wanted, compute_mode=exact).square()
     return (FILL_METRES**2 / (squared + FILL_METRES**2)) ** 3
 
 

@@ -23,8 +23,8 @@ from nhrr_core import (
     sample_features,
     shrink_texture,
 )
-from nhrr_core.clearance import UNIT_PIXELS, UNIT_TEXELS, pixels_per_texel
-from nhrr_core.model import MARGIN_LEVELS, OUTLINE_PIXELS
+from nhrr_core.clearance import pixels_per_texel
+from nhrr_core.config import MARGIN_LEVELS, OUTLINE_PIXELS, UNIT_PIXELS, UNIT_TEXELS
 from nhrr_core.sampling import signed_distance, spread_colours
 
 FIRST = "render_net.layers.1.weight"

@@ -1,0 +1,209 @@
+"""What lies around the networks as ONNX nodes: the texture's holes, the look-up, the outline."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float32, Int64
+
+from motion_transfer.drawing.graphs.graph import FLOAT, INT32, Graph
+from motion_transfer.drawing.graphs.networks import enlarge
+from nhrr_core.config import CLEARANCE_SIZE, FILL_FROM, FILL_METRES, FILL_TO, PLACE_METRES
+from nhrr_core.uv_tables import CHART_SIZE, UVTables, load_uv_tables
+
+TINY = 1e-6  # far below the smallest weight that is not 0, a sixteenth
+LEAST = 1e-20  # likewise of a place's weight, even across the whole body
+
+
+def fill_holes(graph: Graph, texture: str, shown: str, size: int, channels: int) -> tuple[str, str]:
+    """Fill a partial texture from its mirror images and surroundings.
+
+    See `nhrr_core.mirror_texture` and `fill_texture`.
+
+    Args:
+        texture, shown: 1 x C x T x T, and 1 x 1 x T x T, 1 where it shows something.
+        size, channels: T and C.
+    Returns: The texture, and 1 where it or its mirror image was seen.
+    """
+    tables = load_uv_tables()
+    colours = graph("Reshape", texture, np.array([1, channels, -1]))
+    known = graph("Reshape", shown, np.array([1, 1, -1]))
+    side, depth = (resize_twins(twin, size) for twin in (tables.side_twin, tables.depth_twin))
+    for twin in (side, depth, side):
+        hidden = graph("Equal", known, 0)
+        colours = graph("Where", hidden, graph("Gather", colours, twin, axis=2), colours)
+        known = graph("Max", known, graph("Gather", known, twin, axis=2))
+    texture = graph("Reshape", colours, np.array([1, channels, size, size]))
+    shown = graph("Reshape", known, np.array([1, 1, size, size]))
+
+    counted = graph("Mul", shown, _lie_at_their_place(tables, size))
+    weighted = graph.join(graph("Mul", texture, counted), counted)
+    shares = _area_shares(size)
+    places = graph("MatMul", graph("MatMul", shares, weighted), shares.T.copy())
+    rows = graph("Reshape", places, np.array([1, channels + 1, FILL_FROM**2]))
+    spread = graph("MatMul", rows, measure_surroundings(tables.position))
+    total, weight = graph.part(spread, 0, channels), graph.part(spread, channels, channels + 1)
+    mean = graph("Div", total, graph("Max", weight, LEAST))
+    mean = graph("Reshape", mean, np.array([1, channels, FILL_TO, FILL_TO]))
+    filled = resize_nearest(graph, mean, FILL_TO, size)
+    return graph("Where", graph("Greater", shown, 0), texture, filled), shown
+
+
+def resize_twins(twin: Int64[np.ndarray, "S S"], size: int) -> Int64[np.ndarray, " L"]:
+    own = len(twin)
+    centres = (np.arange(size) * 2 + 1) * own // (2 * size)
+    rows, columns = np.divmod(twin[centres][:, centres], own)
+    return (rows * size // own * size + columns * size // own).ravel()
+
+
+def resize_nearest(graph: Graph, x: str, size: int, wanted: int) -> str:
+    """Resize N x C x size x size to wanted x wanted, as torch's `nearest` does."""
+    if size == wanted:
+        return x
+    chosen = np.arange(wanted) * size // wanted
+    return graph("Gather", graph("Gather", x, chosen, axis=2), chosen, axis=3)
+
+
+def _area_shares(size: int) -> Float32[np.ndarray, "P T"]:
+    """The share of each of T texels in each of FILL_FROM places, along one axis."""
+    shares = np.zeros((FILL_FROM, size), np.float32)
+    for place in range(FILL_FROM):
+        first, end = place * size // FILL_FROM, -(-(place + 1) * size // FILL_FROM)
+        shares[place, first:end] = 1 / (end - first)
+    return shares
+
+
+def measure_surroundings(position: Float32[np.ndarray, "256 256 3"]) -> Float32[np.ndarray, "N M"]:
+    """Weigh places as `nhrr_core.measure_surroundings` does."""
+    given, wanted = (_places(position, count).reshape(-1, 3) for count in (FILL_FROM, FILL_TO))
+    squared = np.zeros((len(given), len(wanted)), np.float32)
+    for one, other in zip(given.T, wanted.T, strict=True):
+        squared += np.square(one[:, None] - other)
+    return (FILL_METRES**2 / (squared + FILL_METRES**2)) ** 3
+
+
+def _places(position: Float32[np.ndarray, "256 256 3"], count: int) -> Float32[np.ndarray, "P P 3"]:
+    """Where the middles of count x count equal shares of the texture lie on the body."""
+    step = len(position) // count
+    return position[step // 2 :: step, step // 2 :: step]
+
+
+def _lie_at_their_place(tables: UVTables, size: int) -> Float32[np.ndarray, "T T"]:
+    """1 where a texel belongs to the place whose share of the texture it lies in, else 0."""
+    step = len(tables.position) // FILL_FROM
+    own = _places(tables.position, FILL_FROM).repeat(step, 0).repeat(step, 1)
+    near = np.linalg.norm(tables.position - own, axis=-1) < PLACE_METRES
+    chosen = np.arange(size) * len(near) // size
+    return near[chosen][:, chosen].astype(np.float32)
+
+
+def texel_positions(size: int) -> Float32[np.ndarray, "1 3 T T"]:
+    """The position of each texel on the body, each axis in [-1, 1]."""
+    position = load_uv_tables().position
+    chosen = (np.arange(size) * 2 + 1) * len(position) // (2 * size)
+    places = position[chosen][:, chosen] / np.abs(position).max((0, 1))
+    return np.ascontiguousarray(places.transpose(2, 0, 1)[None])
+
+
+def look_up(graph: Graph, feature_map: str, iuv: str) -> tuple[str, str]:
+    """Look each pixel up in a feature map, see `nhrr_core.sample_features`.
+
+    Args:
+        feature_map: 1 x D x T x T.
+        iuv: 1 x H x W x 3 uint8.
+    Returns: The features, 1 x D x H x W, 0 outside the body; and the body, 1 x 1 x H x W, 1 or 0.
+    """
+    charts = load_uv_tables().charts.reshape(-1, 2)
+    grid = graph("Gather", charts * 2 - 1, _chart_rows(graph, iuv), axis=0)
+    sampled = graph("GridSample", feature_map, grid, mode="bilinear", padding_mode="border")
+    part = graph("Gather", iuv, np.array(0), axis=3)
+    body = graph("Cast", graph("Unsqueeze", part, np.array([1])), to=FLOAT)
+    body = graph("Min", body, 1)
+    return graph("Mul", sampled, body), body
+
+
+def _chart_rows(graph: Graph, iuv: str) -> str:
+    """The row of the flat table of charts, 1 x H x W, of each pixel; the background is part 1's."""
+    codes = graph("Cast", iuv, to=INT32)
+    part, u, v = (graph("Gather", codes, np.array(channel), axis=3) for channel in range(3))
+    one, side = np.array(1, np.int32), np.array(CHART_SIZE, np.int32)
+    chart = graph("Sub", graph("Max", part, one), one)
+    row = graph("Add", graph("Mul", chart, side), v)
+    return graph("Add", graph("Mul", row, side), u)
+
+
+def spread_colours(graph: Graph, x: str, known: str, levels: int, channels: int) -> str:
+    """Carry what is known beyond its outline, see `nhrr_core.sampling.spread_colours`.
+
+    Args:
+        x, known: 1 x C x H x W, and 1 x 1 x H x W, 1 or 0.
+        channels: C.
+    """
+    size = graph("Slice", graph("Shape", known), np.array([2]), np.array([4]))
+    padding = graph("Mod", graph("Neg", size), np.array(2**levels))
+    pads = graph("Concat", np.zeros(6, np.int64), padding, axis=0)
+    means = [graph("Pad", graph("Mul", graph.join(x, known), known), pads, 0)]
+    for _ in range(levels):
+        mean = graph("AveragePool", means[-1], kernel_shape=[2, 2], strides=[2, 2])
+        weight = graph.part(mean, channels, channels + 1)
+        means.append(graph("Div", mean, graph("Max", weight, TINY)))
+    filled = means.pop()
+    while means:
+        finer = means.pop()
+        filled = enlarge(graph, filled, 2)
+        weight = graph.part(filled, channels, channels + 1)
+        filled = graph("Div", filled, graph("Max", weight, TINY))
+        certain = graph("Greater", graph.part(finer, channels, channels + 1), 0)
+        filled = graph("Where", certain, finer, filled)
+    whole = graph("Slice", filled, np.array([0, 0]), size, np.array([2, 3]))
+    return graph.part(whole, 0, channels)
+
+
+def signed_distance(graph: Graph, body: str, reach: int) -> str:
+    """Measure the distance to the outline, see `nhrr_core.sampling.signed_distance`.
+
+    Args:
+        body: 1 x 1 x H x W, 1 or 0.
+    """
+    outside = graph("Sub", 1, body)
+    squared = graph("Mul", graph.join(outside, body), float((reach + 1) ** 2))
+    for axis in (2, 3):  # squares add up, so one axis after the other is exact
+        squared = _nearest_along(graph, squared, axis, reach)
+    lengths = graph("Sqrt", squared)
+    beyond, within = graph.part(lengths, 0, 1), graph.part(lengths, 1, 2)
+    inside = graph("Greater", body, 0)
+    distance = graph("Where", inside, graph("Sub", 0.5, within), graph("Sub", beyond, 0.5))
+    return graph("Clip", distance, float(-reach), float(reach))
+
+
+def _nearest_along(graph: Graph, squared: str, axis: int, reach: int) -> str:
+    """The least sum of a squared distance within reach along an axis, and that way squared."""
+    length = graph("Slice", graph("Shape", squared), *(np.array([axis + i]) for i in (0, 1)))
+    last = graph("Sub", graph("Squeeze", length), np.array(1))
+    own = graph("Range", np.array(0), graph("Add", last, np.array(1)), np.array(1))
+    step = np.arange(-reach, reach + 1)
+    # beyond the edge its last pixel counts again, from farther away
+    shifted = graph("Add", graph("Unsqueeze", own, np.array([0])), step[:, None])
+    index = graph("Min", graph("Max", shifted, np.array(0)), last)
+    away = np.square(step).astype(np.float32).reshape(-1, *[1] * (4 - axis))
+    sums = graph("Add", graph("Gather", squared, index, axis=axis), away)
+    return graph("ReduceMin", sums, axes=[axis], keepdims=0)
+
+
+def pixels_per_texel(graph: Graph, iuv: str, body: str) -> str:
+    """Measure how large the body is in its image, 1 x 1 x 1 x 1, see `nhrr_core.clearance`."""
+    place = load_uv_tables().charts.reshape(-1, 2)
+    column, row = (
+        np.clip((axis * CLEARANCE_SIZE).astype(np.int64), 0, CLEARANCE_SIZE - 1) for axis in place.T
+    )
+    texel = row * CLEARANCE_SIZE + column
+    index = graph("Gather", texel, graph("Reshape", _chart_rows(graph, iuv), np.array([-1])))
+    flat = graph("Reshape", body, np.array([-1]))
+    # what is not the body's falls on one more texel, which does not count
+    beyond = np.array(CLEARANCE_SIZE**2)
+    index = graph("Where", graph("Greater", flat, 0), index, beyond)
+    blank = np.zeros(CLEARANCE_SIZE**2 + 1, np.float32)
+    hit = graph("ScatterElements", blank, index, flat, axis=0)
+    pixels, texels = (graph("ReduceSum", each, keepdims=0) for each in (flat, hit))
+    ratio = graph("Div", pixels, graph("Max", texels, 1))
+    scale = graph("Where", graph("Greater", pixels, 0), graph("Sqrt", ratio), 1)
+    return graph("Reshape", scale, np.array([1, 1, 1, 1]))

@@ -1,0 +1,230 @@
+"""The graphs that engines run: a texture becomes a feature map, target IUV becomes frames.
+
+An image a call: on CPUs, calls side by side are as fast as batches.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import onnx
+
+from motion_transfer.drawing.graphs.graph import FLOAT, UINT8, Graph
+from motion_transfer.drawing.graphs.networks import (
+    Ranges,
+    Weights,
+    append_feature_net,
+    append_render_net,
+    enlarge,
+)
+from motion_transfer.drawing.graphs.places import (
+    fill_holes,
+    look_up,
+    pixels_per_texel,
+    resize_nearest,
+    signed_distance,
+    spread_colours,
+    texel_positions,
+)
+from nhrr_core.config import (
+    CLEARANCE_CHANNELS,
+    CLEARANCE_SIZE,
+    COLOUR_CHANNELS,
+    IUV_CHANNELS,
+    MARGIN_LEVELS,
+    OUTLINE_PIXELS,
+    POSITION_CHANNELS,
+    UNIT_PIXELS,
+    UNIT_TEXELS,
+    ModelConfig,
+)
+from nhrr_core.parts import PART_COUNT
+
+TEXTURE, VISIBILITY, CLEARANCE, FEATURE_MAP = "texture", "visibility", "clearance", "feature_map"
+IUV, DISTANCE, UNIT, FEATURES, FRAME = "iuv", "distance", "unit", "features", "frame"
+
+
+def build_encoder(config: ModelConfig, weights: Weights) -> onnx.ModelProto:
+    """Build what `NeuralReRenderer.encode_texture` computes.
+
+    Inputs: `texture`, 1 x 3 x T x T in [-1, 1], 0 where nothing is seen, T being
+    `config.finest_texture`; `visibility`, 1 x 1 x T x T, 1 or 0; with `config.clearance`
+    `clearance`, 1 x 2 x 128 x 128, 0 where it is not known. Output: `feature_map`, 1 x D x T x T.
+    """
+    graph = Graph()
+    size = config.finest_texture
+    texture = graph.input(TEXTURE, FLOAT, (1, COLOUR_CHANNELS, size, size))
+    visibility = graph.input(VISIBILITY, FLOAT, (1, 1, size, size))
+    carried = [_complete(graph, texture, visibility, config, weights)]
+    if config.clearance:
+        shape = (1, CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
+        clearance = graph.input(CLEARANCE, FLOAT, shape)
+        lengths, measured = graph.part(clearance, 0, 1), graph.part(clearance, 1, 2)
+        filled, known = fill_holes(graph, lengths, measured, CLEARANCE_SIZE, 1)
+        any_known = graph("ReduceMax", known, axes=[2, 3])
+        flag = graph("Add", any_known, np.zeros((1, 1, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32))
+        carried.append(resize_nearest(graph, graph.join(filled, flag), CLEARANCE_SIZE, size))
+    if config.geometry:
+        carried.append(graph.constant(texel_positions(size)))
+    graph.output(FEATURE_MAP, graph.join(*carried), FLOAT, (1, config.map_channels, size, size))
+    return graph.build("encoder")
+
+
+def _complete(
+    graph: Graph, texture: str, visibility: str, config: ModelConfig, weights: Weights
+) -> str:
+    """Append what `NeuralReRenderer` does to a texture; returns the learned features."""
+    if not config.has_feature_net:
+        return texture
+    size = config.finest_texture
+    fine = own = _read_by_feature_net(graph, texture, visibility, config, weights, size)
+    if not config.colour_shortcut:
+        return append_feature_net(graph, graph.join(*own), weights)
+    factor = size // config.texture_size
+    if factor > 1:
+        pool = {"kernel_shape": [factor, factor], "strides": [factor, factor]}
+        share = graph("AveragePool", visibility, **pool)
+        mean = graph("AveragePool", texture, **pool)
+        coarse = graph("Div", mean, graph("Max", share, 1 / factor**2))
+        seen = graph("Cast", graph("Greater", share, 0), to=FLOAT)
+        own = _read_by_feature_net(graph, coarse, seen, config, weights, config.texture_size)
+    features = append_feature_net(graph, graph.join(*own), weights)
+    if factor > 1:
+        features = enlarge(graph, features, factor)
+    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), fine[0])
+    if config.feature_outputs == COLOUR_CHANNELS:
+        return colours
+    return graph.join(colours, graph.part(features, COLOUR_CHANNELS, config.feature_outputs))
+
+
+def _read_by_feature_net(
+    graph: Graph, texture: str, visibility: str, config: ModelConfig, weights: Weights, size: int
+) -> list[str]:
+    """The texture, filled if it is to be, and what is known of it."""
+    known = [visibility] if config.visibility_input else []
+    if config.prefilled:
+        texture, shown = fill_holes(graph, texture, visibility, size, COLOUR_CHANNELS)
+        known.append(shown)
+    if config.geometry:
+        known.append(graph.constant(texel_positions(size)))
+    if config.prior:
+        prior = weights["prior"]
+        factor = size // config.texture_size
+        known.append(graph.constant(prior.repeat(factor, 2).repeat(factor, 3)))
+    return [texture, *known]
+
+
+def build_sampler(config: ModelConfig) -> onnx.ModelProto:
+    """Build what `NeuralReRenderer.feature_image` computes.
+
+    Inputs: `feature_map`, 1 x D x T x T; `iuv`, 1 x H x W x 3 uint8 (I, U, V). Output: `features`,
+    1 x C x H x W, which RenderNet reads.
+    """
+    graph = Graph()
+    _map_input(graph, config)
+    iuv = _iuv_input(graph)
+    features = _append_sampler(graph, config, iuv, outline=None)
+    graph.output(FEATURES, features, FLOAT, (1, config.render_inputs, "height", "width"))
+    return graph.build("sampler")
+
+
+def build_painter(
+    config: ModelConfig,
+    weights: Weights,
+    *,
+    ranges: Ranges | None = None,
+    outline_given: bool = False,
+    taps: bool = False,
+) -> onnx.ModelProto:
+    """Build what `NeuralReRenderer.render` computes, from target IUV to a frame of 8 bits.
+
+    Inputs: `feature_map`, 1 x D x T x T; `iuv`, 1 x H x W x 3 uint8 (I, U, V), H and W multiples
+    of 2**down_blocks. Output: `frame`, 1 x H x W x K uint8, RGB and alpha where the model has it.
+
+    Args:
+        ranges: Makes RenderNet's convolutions ones of 8-bit numbers.
+        outline_given: Whether `distance`, 1 x 1 x H x W, and `unit`, 1 x 1 x 1 x 1, are inputs, see
+            `measure_outline`: that is several times as fast as to find them in the graph.
+        taps: Whether what RenderNet's convolutions read is given out as well, by the names of their
+            weights.
+    """
+    graph = Graph()
+    _map_input(graph, config)
+    iuv = _iuv_input(graph)
+    outline = None
+    if outline_given and config.geometry:
+        distance = graph.input(DISTANCE, FLOAT, (1, 1, "height", "width"))
+        outline = distance, graph.input(UNIT, FLOAT, (1, 1, 1, 1))
+    features = _append_sampler(graph, config, iuv, outline=outline)
+    drawn, read = append_render_net(graph, features, weights, config, ranges)
+    frame = _blend(graph, drawn, features, config)
+    levels = graph("Mul", graph("Add", frame, 1), 127.5)
+    rows = graph("Clip", graph("Round", graph("Transpose", levels, perm=[0, 2, 3, 1])), 0, 255)
+    shape = (1, "height", "width", config.render_outputs)
+    graph.output(FRAME, graph("Cast", rows, to=UINT8), UINT8, shape)
+    for name, value in read.items() if taps else ():
+        graph.output(name, value, FLOAT, (1, f"{name}_c", f"{name}_h", f"{name}_w"))
+    return graph.build("painter")
+
+
+def _map_input(graph: Graph, config: ModelConfig) -> None:
+    size = config.finest_texture
+    graph.input(FEATURE_MAP, FLOAT, (1, config.map_channels, size, size))
+
+
+def _iuv_input(graph: Graph) -> str:
+    return graph.input(IUV, UINT8, (1, "height", "width", IUV_CHANNELS))
+
+
+def _append_sampler(
+    graph: Graph, config: ModelConfig, iuv: str, *, outline: tuple[str, str] | None
+) -> str:
+    """Append the feature image.
+
+    Args:
+        outline: Distance to it, and the unit of clearance, where they are given.
+    """
+    sampled, body = look_up(graph, FEATURE_MAP, iuv)
+    learned, end = config.feature_outputs, config.map_channels
+    image = [graph.part(sampled, 0, learned)]
+    nearest = []
+    if config.clearance:
+        if outline is None:
+            scale = pixels_per_texel(graph, iuv, body)
+            unit = graph("Mul", scale, UNIT_TEXELS / UNIT_PIXELS)
+        else:
+            unit = outline[1]
+        clearance = graph("Mul", graph.part(sampled, learned, learned + 1), unit)
+        image += [clearance, graph.part(sampled, learned + 1, learned + 2)]
+        nearest.append(clearance)
+    if config.variant == "warp-cond":
+        codes = graph("Cast", graph("Transpose", iuv, perm=[0, 3, 1, 2]), to=FLOAT)
+        scale = np.array([2 / PART_COUNT, 2 / 255, 2 / 255], np.float32)[:, None, None]
+        image.append(graph("Sub", graph("Mul", codes, scale), 1))
+    if config.geometry:
+        nearest.append(graph.part(sampled, end - POSITION_CHANNELS, end))
+        channels = POSITION_CHANNELS + int(config.clearance)
+        image.append(spread_colours(graph, graph.join(*nearest), body, MARGIN_LEVELS, channels))
+        distance = signed_distance(graph, body, OUTLINE_PIXELS) if outline is None else outline[0]
+        image.append(graph("Mul", distance, 1 / UNIT_PIXELS))
+    return graph.join(*image)
+
+
+def _blend(graph: Graph, drawn: str, features: str, config: ModelConfig) -> str:
+    """Append what makes the frame of a drawing, see `NeuralReRenderer.blend`."""
+    if not config.colour_shortcut:
+        return drawn
+    colours = graph("Clip", graph.part(features, 0, COLOUR_CHANNELS), -1, 1)
+    if config.colour_margin:
+        if config.geometry:
+            distance = graph.part(features, config.render_inputs - 1, config.render_inputs)
+            body = graph("Less", distance, 0)
+        else:
+            body = graph("Greater", graph("ReduceMax", graph("Abs", features), axes=[1]), 0)
+        body = graph("Cast", body, to=FLOAT)
+        colours = spread_colours(graph, colours, body, MARGIN_LEVELS, COLOUR_CHANNELS)
+    # twice: tanh lies in [-1, 1], the difference of two colours in [-2, 2]
+    painted = graph("Mul", graph.part(drawn, 0, COLOUR_CHANNELS), 2)
+    blended = graph("Clip", graph("Add", colours, painted), -1, 1)
+    if not config.alpha:
+        return blended
+    return graph.join(blended, graph.part(drawn, COLOUR_CHANNELS, COLOUR_CHANNELS + 1))
