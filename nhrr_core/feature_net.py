@@ -7,7 +7,7 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
-DOWN_BLOCKS = 4
+from nhrr_core.tensors import FEATURE_DOWN_BLOCKS, feature_widths
 
 
 def _two_convolutions(inputs: int, outputs: int) -> nn.Sequential:
@@ -36,14 +36,14 @@ class FeatureNet(nn.Module):
 
     def __init__(self, *, inputs: int, outputs: int, width: int) -> None:
         super().__init__()
-        widths = [width, width * 2, width * 4, width * 8, width * 8]
+        widths = feature_widths(width)
         self.entry = _two_convolutions(inputs, widths[0])
         self.down = nn.ModuleList(
-            _two_convolutions(widths[i], widths[i + 1]) for i in range(DOWN_BLOCKS)
+            _two_convolutions(widths[i], widths[i + 1]) for i in range(FEATURE_DOWN_BLOCKS)
         )
         self.up = nn.ModuleList(
             _two_convolutions(2 * widths[i], widths[max(i - 1, 0)])
-            for i in reversed(range(DOWN_BLOCKS))
+            for i in reversed(range(FEATURE_DOWN_BLOCKS))
         )
         self.exit = nn.Conv2d(widths[0], outputs, 1)
 

@@ -21,7 +21,12 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from motion_transfer.errors import InputError, WeightsError
-from motion_transfer.weights.tensors import check_weights, list_misfits, load_pickled
+from motion_transfer.weights.tensors import (
+    check_weights,
+    list_entries,
+    list_misfits,
+    load_pickled,
+)
 
 EPSILON = 1e-3  # of TensorFlow's batch norm in this network
 CLASSES = 1000
@@ -76,7 +81,7 @@ def load_weights(
     """
     tensors = read_tensors(path, what=what, remedy=remedy)
     state = {own: tensor for name, tensor in tensors.items() if (own := rename(name)) is not None}
-    if listed := list_misfits(network, state):
+    if listed := list_misfits(list_entries(network.state_dict()), list_entries(state)):
         raise WeightsError(f"{path} does not hold {what}: {listed}; {remedy}")
     network.load_state_dict(state)
     return network

@@ -7,19 +7,31 @@ header to the configuration, and from the tensors to the model, all of them and 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-
-import torch
-from safetensors.torch import save_file
+from typing import TYPE_CHECKING
 
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.media.publish import name_beside
 from motion_transfer.media.structured import parse_json, shown
 from motion_transfer.media.work import digest_file
-from motion_transfer.weights.tensors import check_weights, load_network, read_header
-from nhrr_core import ConfigError, ModelConfig, NeuralReRenderer
+from motion_transfer.weights.tensors import (
+    Array,
+    Entry,
+    check_weights,
+    read_header,
+    read_tensors,
+)
+from nhrr_core.config import ModelConfig
+from nhrr_core.errors import ConfigError
+from nhrr_core.tensors import list_tensors
+
+if TYPE_CHECKING:
+    import torch
+
+    from nhrr_core import NeuralReRenderer
 
 FORMAT = "nhrr-1"
 RESERVED = ("format", "config")
@@ -49,6 +61,8 @@ def save_checkpoint(
         notes: Words about the weights, such as `licence` and `data`.
         dtype: What floating-point tensors are stored as; None: as they are.
     """
+    from safetensors.torch import save_file
+
     state = {}
     for name, tensor in model.state_dict().items():
         stored = dtype if tensor.is_floating_point() else None
@@ -63,15 +77,34 @@ def save_checkpoint(
         temporary.unlink(missing_ok=True)
 
 
-def load_checkpoint(path: Path) -> NeuralReRenderer:
-    """Load the model of a checkpoint, in evaluation mode, on the CPU, in float32.
+def read_checkpoint(path: Path) -> tuple[ModelConfig, dict[str, Array]]:
+    """Read configuration and tensors of a checkpoint, those that are floating as float32.
 
     Raises: WeightsError if the file is missing, truncated, not a checkpoint of this model, or its
         tensors are not exactly those that its configuration calls for.
     """
     header = read_header(path, "weights")
     config = _read_config(path, header.metadata)
-    return load_network(lambda: NeuralReRenderer(config), header.state, path, "weights").eval()
+    wanted = {
+        name: Entry(shape, not name.endswith("num_batches_tracked"))
+        for name, shape in list_tensors(config).items()
+    }
+    return config, read_tensors(path, wanted, header.state, "weights")
+
+
+def load_checkpoint(path: Path) -> NeuralReRenderer:
+    """Load the model of a checkpoint, in evaluation mode, on the CPU, in float32.
+
+    Raises: WeightsError, see `read_checkpoint`.
+    """
+    import torch
+
+    from nhrr_core import NeuralReRenderer
+
+    config, tensors = read_checkpoint(path)
+    model = NeuralReRenderer(config)
+    model.load_state_dict({name: torch.tensor(values) for name, values in tensors.items()})
+    return model.eval()
 
 
 def digest_weights(path: Path) -> str:
@@ -85,7 +118,7 @@ def inspect_checkpoint(path: Path) -> CheckpointInfo:
     metadata, state = read_header(path, "weights")
     # safetensors tells them in an order that changes from run to run
     notes = {key: metadata[key] for key in sorted(metadata) if key not in RESERVED}
-    count = sum(tensor.numel() for tensor in state.values())
+    count = sum(math.prod(entry.shape) for entry in state.values())
     return CheckpointInfo(path, _read_config(path, metadata), notes, len(state), count)
 
 

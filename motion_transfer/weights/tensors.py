@@ -9,31 +9,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-import torch
-from safetensors import safe_open
-from safetensors.torch import load_file
-from torch import Tensor, nn
+import numpy as np
+from jaxtyping import Shaped
+from safetensors import deserialize, safe_open
 
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.media.files import check_readable
 
-PICKLES = (".pt", ".pth", ".ckpt", ".bin", ".pkl")
-FLOATS = ("F64", "F32", "F16", "BF16")
+if TYPE_CHECKING:
+    from torch import Tensor, nn
 
-N = TypeVar("N", bound=nn.Module)
+PICKLES = (".pt", ".pth", ".ckpt", ".bin", ".pkl")
+FLOATS = {"F64": np.float64, "F32": np.float32, "F16": np.float16, "BF16": np.uint16}
+INTEGERS = {"I64": np.int64, "I32": np.int32, "I16": np.int16, "I8": np.int8, "U8": np.uint8}
+
+Array = Shaped[np.ndarray, "..."]
+
+N = TypeVar("N", bound="nn.Module")
+
+
+class Entry(NamedTuple):
+    """What a tensor is, without its content."""
+
+    shape: tuple[int, ...]
+    floating: bool
 
 
 class Header(NamedTuple):
-    """What stands before the tensors of a safetensors file.
-
-    Attributes:
-        state: By name, tensors without content: their shapes, and whether they are floating.
-    """
+    """What stands before the tensors of a safetensors file; `state` lists those by name."""
 
     metadata: dict[str, str]
-    state: dict[str, Tensor]
+    state: dict[str, Entry]
 
 
 def read_header(path: Path, what: str) -> Header:
@@ -45,12 +53,11 @@ def read_header(path: Path, what: str) -> Header:
     """
     check_weights(path, what)
     try:
-        with safe_open(path, framework="pt") as file:
+        with safe_open(path, framework="np") as file:
             state = {}
             for name in file.keys():  # noqa: SIM118 - it is no mapping
                 part = file.get_slice(name)
-                kind = torch.float32 if part.get_dtype() in FLOATS else torch.int64
-                state[name] = torch.empty(part.get_shape(), dtype=kind, device="meta")
+                state[name] = Entry(tuple(part.get_shape()), part.get_dtype() in FLOATS)
             return Header(dict(file.metadata() or {}), state)
     except Exception as error:  # of a lying header they have no common base
         other = path.suffix.lower() in PICKLES
@@ -61,48 +68,76 @@ def read_header(path: Path, what: str) -> Header:
         ) from error
 
 
-def load_network(make: Callable[[], N], state: Mapping[str, Tensor], path: Path, what: str) -> N:
-    """Make a network and fill it from a safetensors file: all of its tensors, and no others.
+def read_tensors(
+    path: Path, wanted: Mapping[str, Entry], state: Mapping[str, Entry], what: str
+) -> dict[str, Array]:
+    """Read the tensors of a safetensors file: all that are wanted, and no others.
 
-    Whether they fit is found out before any memory is taken for the network or for them.
+    Whether they fit is found out before any memory is taken for them.
 
     Args:
-        make: Makes the network that the file's configuration describes.
         state: Of the file's header.
         what: See `read_header`.
+    Returns: By name, float32 for all that are floating.
     Raises: WeightsError if the tensors do not fit, or hold values that are no numbers.
     """
-    with torch.device("meta"):
-        wanted = make()
     if listed := list_misfits(wanted, state):
         raise WeightsError(f"{what} {path} do not fit their own configuration: {listed}")
     try:
-        tensors = load_file(path)
+        stored = deserialize(path.read_bytes())
+        tensors = {name: _decode(**told) for name, told in stored}
     except Exception as error:
         raise WeightsError(f"{what} {path} cannot be read: {first_line(error)}") from error
     for name, tensor in tensors.items():
-        if not tensor.isfinite().all():
+        if not np.isfinite(tensor).all():
             raise WeightsError(
                 f"{what} {path} are damaged: {name} holds values that are no finite numbers;"
                 " download or export again"
             )
+    return tensors
+
+
+def _decode(dtype: str, shape: list[int], data: bytearray) -> Array:
+    values = np.frombuffer(data, {**FLOATS, **INTEGERS}[dtype]).reshape(shape)
+    if dtype == "BF16":  # the upper half of a float32
+        return (values.astype(np.uint32) << 16).view(np.float32)
+    return values.astype(np.float32, copy=False) if dtype in FLOATS else values
+
+
+def load_network(make: Callable[[], N], state: Mapping[str, Entry], path: Path, what: str) -> N:
+    """Make a network and fill it from a safetensors file, see `read_tensors`.
+
+    Args:
+        make: Makes the network that the file's configuration describes.
+    Raises: WeightsError if the tensors do not fit, or hold values that are no numbers.
+    """
+    import torch
+
+    with torch.device("meta"):
+        wanted = list_entries(make().state_dict())
+    tensors = read_tensors(path, wanted, state, what)
     network = make()
-    network.load_state_dict(tensors)
+    network.load_state_dict({name: torch.tensor(values) for name, values in tensors.items()})
     return network
 
 
-def list_misfits(network: nn.Module, state: Mapping[str, Tensor]) -> str:
-    """List up to three things that keep tensors from being exactly those of a network; else ""."""
-    wanted = network.state_dict()
-    problems = [f"{name} is missing" for name in wanted if name not in state]
-    problems += [f"{name} is unknown" for name in state if name not in wanted]
-    for name, tensor in wanted.items():
-        if name not in state:
-            continue
-        found = state[name]
-        if found.shape != tensor.shape:
-            problems.append(f"{name} is {list(found.shape)}, not {list(tensor.shape)}")
-        elif found.is_floating_point() != tensor.is_floating_point():
+def list_entries(state: Mapping[str, Tensor]) -> dict[str, Entry]:
+    """Tell what tensors are."""
+    return {
+        name: Entry(tuple(tensor.shape), tensor.is_floating_point())
+        for name, tensor in state.items()
+    }
+
+
+def list_misfits(wanted: Mapping[str, Entry], found: Mapping[str, Entry]) -> str:
+    """List up to three things that keep tensors from being exactly those wanted; else ""."""
+    problems = [f"{name} is missing" for name in wanted if name not in found]
+    problems += [f"{name} is unknown" for name in found if name not in wanted]
+    for name in (name for name in wanted if name in found):
+        if found[name].shape != wanted[name].shape:
+            shapes = list(found[name].shape), list(wanted[name].shape)
+            problems.append(f"{name} is {shapes[0]}, not {shapes[1]}")
+        elif found[name].floating != wanted[name].floating:
             problems.append(f"{name} holds another kind of numbers")
     return "; ".join(problems[:3]) + ("; ..." if len(problems) > 3 else "")
 
@@ -112,6 +147,8 @@ def load_pickled(path: Path, what: str) -> Any:
 
     Raises: WeightsError.
     """
+    import torch
+
     check_weights(path, what)
     try:
         return torch.load(path, map_location="cpu", weights_only=True)

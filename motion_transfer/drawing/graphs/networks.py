@@ -15,6 +15,9 @@ from jaxtyping import Float32
 
 from motion_transfer.drawing.graphs.graph import Graph
 from nhrr_core.config import ModelConfig
+from nhrr_core.tensors import FEATURE_DOWN_BLOCKS, convolution_layers
+
+Kernel = Float32[np.ndarray, "A B H W"]
 
 Weights = Mapping[str, Float32[np.ndarray, "..."]]
 """A model's tensors, by the names of `NeuralReRenderer.state_dict()`."""
@@ -24,7 +27,6 @@ Ranges = Mapping[str, tuple[float, float]]
 
 LEVELS = 127  # of an 8-bit number with a sign, either way
 NORM_EPSILON = 1e-5  # of torch's norms
-FEATURE_DOWN_BLOCKS = 4
 
 
 class Convolutions:
@@ -83,7 +85,7 @@ class Convolutions:
         operator: str,
         x: str,
         name: str,
-        weight: Float32[np.ndarray, ...],
+        weight: Kernel,
         bias: Float32[np.ndarray, " O"] | None,
         attributes: dict[str, Any],
     ) -> str:
@@ -104,7 +106,7 @@ class Convolutions:
         codes = self._graph("QuantizeLinear", x, step, np.array(zero))
         return self._graph("DequantizeLinear", codes, step, np.array(zero))
 
-    def _stored(self, weight: Float32[np.ndarray, ...], outputs: int) -> str:
+    def _stored(self, weight: Kernel, outputs: int) -> str:
         """Store a kernel in 8 bits, with a scale for each output channel.
 
         Args:
@@ -148,7 +150,7 @@ def append_render_net(
     Returns: The drawing in [-1, 1], and what each convolution reads.
     """
     convolutions = Convolutions(graph, weights, ranges)
-    names = (f"render_net.layers.{index}" for index in _convolutions_of(config))
+    names = (f"render_net.layers.{index}" for index in convolution_layers(config))
     width = config.render_width
 
     def norm(x: str, channels: int) -> str:
@@ -175,18 +177,6 @@ def append_render_net(
         x = graph.join(x, features)
     x = convolutions.in_blocks(_reflect(graph, x, 3), next(names))
     return graph("Tanh", x), convolutions.read
-
-
-def _convolutions_of(config: ModelConfig) -> list[int]:
-    """Where convolutions and residual blocks stand among RenderNet's layers."""
-    first_block = 4 + 3 * config.down_blocks
-    first_doubling = first_block + config.residual_blocks
-    return [
-        *range(1, first_block, 3),
-        *range(first_block, first_doubling),
-        *range(first_doubling, first_doubling + 3 * config.down_blocks, 3),
-        first_doubling + 3 * config.down_blocks + 1,
-    ]
 
 
 def even_kernel(weight: Float32[np.ndarray, "I O 3 3"]) -> Float32[np.ndarray, "I O 3 3"]:
