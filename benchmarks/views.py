@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 
 from motion_transfer.drawing.source import Source, unfold_source
+from motion_transfer.drawing.textures import merge_textures
 from motion_transfer.evaluation.candidates import Draw, OpenedSource, RenderedCandidate
 from motion_transfer.evaluation.framing import Framing, Image
 from motion_transfer.evaluation.measures import EFFICIENTNET, choose_measures
@@ -50,7 +51,6 @@ from motion_transfer.training.pairs import Pair, PairList
 from motion_transfer.training.pictures import PersonPicture, PhotoFile
 from motion_transfer.training.sources import HELD_OUT_SEED, HELD_OUT_SIZE
 from motion_transfer.weights import find_weights
-from nhrr_core import merge_textures
 
 SIDES = {"front": 0.0, "back": math.pi, "left": math.pi / 2, "right": -math.pi / 2}
 """The photos, and how far the person turns for each, radians, as `Pose.turn` counts."""

@@ -60,3 +60,8 @@ class TrainingError(MotionTransferError):
 
 class FetchError(MotionTransferError):
     """Something that has to be downloaded cannot be had."""
+
+
+def first_line(error: Exception) -> str:
+    """Tell a library's reason in one line, or its kind where it gives none."""
+    return next((line.strip() for line in str(error).splitlines() if line.strip()), repr(error))

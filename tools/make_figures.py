@@ -74,7 +74,7 @@ def main(assets: Path) -> None:
     save(ROOT / "docs" / "people.jpg", people_sheet(assets))
     save(ROOT / "docs" / "astronaut.jpg", photo_alone())
 
-    partial = np.where(source.visibility[0, 0, ..., None] > 0, picture(source.texture), 255)
+    partial = np.where(source.visibility[0, ..., None] > 0, picture(source.texture), 255)
     save(
         ROOT / "docs" / "how_it_works.png",
         np.hstack(
@@ -82,7 +82,7 @@ def main(assets: Path) -> None:
                 panel(source.photo.rgb, "source photo"),
                 panel(colour_iuv(source.iuv), "its IUV"),
                 panel(partial.astype(np.uint8), "partial texture: what is seen"),
-                panel(picture(feature_map[:, :3]), "feature map (3 of 16), once"),
+                panel(picture(feature_map[0, :3]), "feature map (3 of 16), once"),
                 panel(colour_iuv(targets[1]), "target IUV, per frame"),
                 panel(results[1], "frame"),
             ]
@@ -119,7 +119,7 @@ def people_sheet(assets: Path) -> np.ndarray:
 
 def picture(texture) -> np.ndarray:
     """A texture in [-1, 1] as an RGB picture."""
-    colours = np.moveaxis(np.asarray(texture[0]), 0, -1)
+    colours = np.moveaxis(texture, 0, -1)
     return ((colours + 1) * 127.5).round().clip(0, 255).astype(np.uint8)
 
 

@@ -8,13 +8,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import torch
-import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float32, UInt8
 
 from motion_transfer.drawing.views import EARS_METRES, HEAD, View, merge_views
-from nhrr_core import load_uv_layout
-from nhrr_core.uv_tables import TWIN_SIZE
+from nhrr_core import load_uv_tables
 
 WELL = 1.0
 """A texel is seen well by so many pixels along its side, see `View.rating`."""
@@ -91,23 +88,27 @@ class Coverage:
 
 
 def measure_coverage(views: Sequence[View]) -> Coverage:
-    """Measure what photos show together. Args: views: Rated, as those of several photos are."""
+    """Measure what photos show together.
+
+    Args:
+        views: Of 256 x 256 texels, and rated, as those of several photos are.
+    """
     merged = merge_views(views)
-    size = (TWIN_SIZE, TWIN_SIZE)
     names = tuple(dict.fromkeys(view.name for view in views))
-    shares = F.adaptive_avg_pool2d(merged.shares[None], size)[0]
-    own = torch.stack(
-        [shares[[i for i, view in enumerate(views) if view.name == name]].sum(0) for name in names]
+    shares = np.stack(
+        [
+            merged.shares[[i for i, view in enumerate(views) if view.name == name]].sum(0)
+            for name in names
+        ]
     )
-    rating = F.adaptive_max_pool2d(torch.cat([view.rating for view in views]), size).amax((0, 1))
-    return Coverage(names, own.numpy(), rating.numpy() / WELL, _measure_area(), merged.strangers)
+    rating = np.max([view.rating[0] for view in views], axis=0)
+    return Coverage(names, shares, rating / WELL, _measure_area(), merged.strangers)
 
 
 def regions() -> dict[str, Bool[np.ndarray, "T T"]]:
     """Name parts of the body as people do, each with its texels."""
-    layout = load_uv_layout()
-    part = layout.part.numpy()
-    ahead = layout.position.numpy()[..., 2] > EARS_METRES
+    tables = load_uv_tables()
+    part, ahead = tables.part, tables.position[..., 2] > EARS_METRES
     parts = {
         "front of the trunk": (2,),
         "back of the trunk": (1,),
@@ -136,7 +137,7 @@ def visible_from(side: str) -> Bool[np.ndarray, "T T"]:
 
 def _project(side: str) -> list[Float32[np.ndarray, "T T"]]:
     """To the right in the picture, up, and towards the camera; metres."""
-    x, y, z = load_uv_layout().position.numpy().transpose(2, 0, 1)
+    x, y, z = load_uv_tables().position.transpose(2, 0, 1)
     return {
         "front": [x, y, z],
         "back": [-x, y, -z],
@@ -147,7 +148,7 @@ def _project(side: str) -> list[Float32[np.ndarray, "T T"]]:
 
 def _measure_area() -> Float[np.ndarray, "T T"]:
     """The surface of each texel, as a share of all."""
-    position = load_uv_layout().position.numpy()
+    position = load_uv_tables().position
     right, down = (np.diff(position, axis=axis, append=np.nan) for axis in (1, 0))
     cross = np.linalg.norm(np.cross(right, down), axis=-1)
     # across a chart's border neighbours lie far apart; outside all charts they are one place

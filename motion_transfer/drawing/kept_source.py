@@ -23,21 +23,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
-import torch.nn.functional as F
-from jaxtyping import Float, UInt8
+from jaxtyping import Float32, UInt8
 from safetensors import safe_open
-from safetensors.torch import save_file
-from torch import Tensor
+from safetensors.numpy import save_file
 
 from motion_transfer.drawing.source import Source, SourcePicture
-from motion_transfer.errors import InputError
+from motion_transfer.drawing.textures import pick_nearest, shrink_texture
+from motion_transfer.errors import InputError, first_line
 from motion_transfer.media.files import check_readable
 from motion_transfer.media.pictures.photo import decode_png, encode_png
 from motion_transfer.media.structured import parse_json, shown
 from motion_transfer.version import __version__
-from motion_transfer.weights.tensors import first_line
-from nhrr_core import shrink_texture
 from nhrr_core.config import CLEARANCE_SIZE
 from nhrr_core.parts import PART_COUNT
 
@@ -57,7 +53,7 @@ AGAIN = "copy it again, or save it again with `mt source save`"
 def save_source(
     path: Path,
     sources: Sequence[Source],
-    features: Mapping[str, Float[Tensor, "1 D T T"]],
+    features: Mapping[str, Float32[np.ndarray, "1 D T T"]],
     facts: Mapping[str, Any],
 ) -> None:
     """Write a source; the same content gives the same bytes.
@@ -71,21 +67,22 @@ def save_source(
     source = sources[0]
     photo, alphas = source.photo, (source.photo.alpha, source.alpha)
     tensors = {
-        name: torch.from_numpy(np.frombuffer(_pack(colours, alpha), np.uint8).copy())
+        name: np.frombuffer(_pack(colours, alpha), np.uint8)
         for name, colours, alpha in zip(
             ("photo", "person"), (photo.rgb, source.iuv), alphas, strict=True
         )
     }
     for each in sources:
         size = each.texture.shape[-1]
-        tensors[f"texture/{size}"] = each.texture[0]
-        tensors[f"visibility/{size}"] = each.visibility[0].to(torch.uint8)
+        tensors[f"texture/{size}"] = each.texture
+        tensors[f"visibility/{size}"] = each.visibility.astype(np.uint8)
     if source.clearance is not None:
-        tensors["clearance"] = source.clearance[0]
+        tensors["clearance"] = source.clearance
     tensors |= {f"features/{digest}": each[0] for digest, each in features.items()}
     told = {**facts, "format": FORMAT, "program": __version__, "notes": list(source.notes)}
     metadata = {FACTS: json.dumps(told, sort_keys=True, ensure_ascii=False)}
-    save_file({name: each.contiguous() for name, each in tensors.items()}, path, metadata=metadata)
+    whole = {name: np.ascontiguousarray(each) for name, each in tensors.items()}
+    save_file(whole, path, metadata=metadata)
     path.chmod(0o644)  # safetensors writes for the owner only
 
 
@@ -101,7 +98,7 @@ def load_source(path: Path, texture_size: int) -> Source:
         texture, visibility, note = _read_texture(file, texture_size)
         clearance = None
         if "clearance" in file.shapes:
-            clearance = file.read("clearance", "F32", (2, CLEARANCE_SIZE, CLEARANCE_SIZE))[None]
+            clearance = file.read("clearance", "F32", (2, CLEARANCE_SIZE, CLEARANCE_SIZE))
     return Source(
         picture.photo,
         picture.iuv,
@@ -123,7 +120,7 @@ def load_picture(path: Path) -> SourcePicture:
 
 def load_features(
     path: Path, digest: str, shape: tuple[int, int, int, int]
-) -> Float[Tensor, "1 D T T"] | None:
+) -> Float32[np.ndarray, "1 D T T"] | None:
     """Read the feature map that some weights made; None if only others did.
 
     Args:
@@ -163,7 +160,7 @@ class _File:
         if not holds:
             raise InputError(f"{self.where} is damaged: {otherwise}; {AGAIN}")
 
-    def read(self, name: str, kind: str, shape: tuple[int | None, ...]) -> Tensor:
+    def read(self, name: str, kind: str, shape: tuple[int | None, ...]) -> np.ndarray:
         """Read a tensor of a kind and a shape, None for any length; numbers are finite."""
         self.expect(name in self.shapes, f"{name} is missing")
         found, held = self.shapes[name], self.kinds[name]
@@ -175,10 +172,7 @@ class _File:
             fits and held == kind, f"{name} is {held} {list(found)}, where {kind} {wanted} belongs"
         )
         tensor = self.handle.get_tensor(name)
-        self.expect(
-            not tensor.is_floating_point() or tensor.isfinite().all(),
-            f"{name} holds values that are no finite numbers",
-        )
+        self.expect(np.isfinite(tensor).all(), f"{name} holds values that are no finite numbers")
         return tensor
 
     @property
@@ -195,7 +189,7 @@ def _open(path: Path) -> Iterator[_File]:
     where = f"source {path}"
     check_readable(path, "source")
     try:
-        handle = safe_open(path, framework="pt")
+        handle = safe_open(path, framework="np")
     except Exception as error:  # of a lying header they have no common base
         raise InputError(
             f"{where} is not a whole safetensors file ({first_line(error)}); {AGAIN}"
@@ -230,7 +224,7 @@ def _open(path: Path) -> Iterator[_File]:
 
 def _read_picture(file: _File, path: Path) -> SourcePicture:
     photo, person = (
-        decode_png(file.read(name, "U8", (None,)).numpy().tobytes(), path, file.where)
+        decode_png(file.read(name, "U8", (None,)).tobytes(), path, file.where)
         for name in ("photo", "person")
     )
     iuv = person.rgb
@@ -242,7 +236,7 @@ def _read_picture(file: _File, path: Path) -> SourcePicture:
 
 def _read_texture(
     file: _File, wanted: int
-) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"], list[str]]:
+) -> tuple[Float32[np.ndarray, "3 T T"], Float32[np.ndarray, "1 T T"], list[str]]:
     """Read texture and visibility, and say so where they are coarser than wanted."""
     kept = [
         shape[-1]
@@ -251,14 +245,14 @@ def _read_texture(
     ]
     file.expect(kept, "it has no texture")
     size = wanted if wanted in kept else max(kept)
-    texture = file.read(f"texture/{size}", "F32", (3, size, size))[None]
-    visibility = file.read(f"visibility/{size}", "U8", (1, size, size))[None].float()
+    texture = file.read(f"texture/{size}", "F32", (3, size, size))
+    visibility = file.read(f"visibility/{size}", "U8", (1, size, size)).astype(np.float32)
     file.expect(visibility.max() <= 1, "its visibility is neither 0 nor 1")
-    file.expect(texture.abs().max() <= 1 + ROUNDING, "its colours are beyond black or white")
+    file.expect(np.abs(texture).max() <= 1 + ROUNDING, "its colours are beyond black or white")
     file.expect(not (texture * (1 - visibility)).any(), "it has colours where nothing is seen")
     if size % wanted == 0:
         return *shrink_texture(texture, visibility, size // wanted), []
-    texture, visibility = (F.interpolate(each, (wanted, wanted)) for each in (texture, visibility))
+    texture, visibility = (pick_nearest(each, wanted) for each in (texture, visibility))
     if size > wanted:
         return texture, visibility, []
     note = f"{file.where} was saved with {size} texels a side, and these weights use {wanted}"

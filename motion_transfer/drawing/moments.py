@@ -6,7 +6,6 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Float
-from torch import Tensor
 
 MOST_MOMENTS = 24
 """More add little: a turn shows each place of the body for a quarter of its time."""
@@ -34,9 +33,9 @@ class Moments(Generic[Moment]):
         self._limit = limit
         self._kept: list[tuple[Rating, Moment]] = []
 
-    def offer(self, rating: Float[Tensor, "1 1 S S"], moment: Moment) -> None:
+    def offer(self, rating: Float[np.ndarray, "1 S S"], moment: Moment) -> None:
         """Look at the next moment; what is not kept is forgotten."""
-        flat = rating.flatten().numpy()
+        flat = rating.ravel()
         best = self._best(self._kept, like=flat)
         if np.maximum(flat - best, 0).sum() <= LEAST_GAIN * best.sum():
             return

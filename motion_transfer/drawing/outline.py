@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import torch
-from jaxtyping import Bool, Float, Float32, UInt8
-from torch import Tensor
+from jaxtyping import Bool, Float32, UInt8
 
 from motion_transfer.drawing.person import COVERS, bounding_box, disc, occupancy
+from motion_transfer.drawing.unfolding import unfold_clearance
 from motion_transfer.media.nearest import nearest_pixels
 from motion_transfer.media.pictures.photo import Photo
-from nhrr_core import load_uv_layout, unfold_clearance
 from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE
 
 ROOM_SHARE = 0.25  # of the body's longer side: nobody's clothes reach further
@@ -33,7 +31,7 @@ def clearance_of(
     parts: tuple[int, ...],
     *,
     alpha: UInt8[np.ndarray, "H W"] | None = None,
-) -> Float[Tensor, "1 2 128 128"]:
+) -> Float32[np.ndarray, "2 128 128"]:
     """Measure the clearance of some parts of a person; 0 where it is not known.
 
     How it lies in UV space says `nhrr_core.unfold_clearance`.
@@ -42,7 +40,7 @@ def clearance_of(
         alpha: Says where the person ends; None: the photo's own alpha, or else a plain backdrop.
     """
     alpha = photo.alpha if alpha is None else alpha
-    unknown = torch.zeros(1, CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
+    unknown = np.zeros((CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32)
     box = bounding_box(iuv)
     if not box.area:
         return unknown
@@ -61,12 +59,7 @@ def clearance_of(
     if alpha is None:
         return unknown
     clearance, measured = measure_clearance(own, alpha)
-    return unfold_clearance(
-        torch.from_numpy(clearance)[None, None],
-        torch.from_numpy(measured & np.isin(own[..., 0], parts))[None, None],
-        torch.from_numpy(own.transpose(2, 0, 1).copy())[None],
-        load_uv_layout().charts,
-    )
+    return unfold_clearance(clearance, measured & np.isin(own[..., 0], parts), own)
 
 
 def stand_out(

@@ -8,10 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import torch
-import torch.nn.functional as F
-from jaxtyping import Float, UInt8
-from torch import Tensor
+from jaxtyping import Float32, UInt8
 
 from motion_transfer.drawing.outline import clearance_of, grab_cut
 from motion_transfer.drawing.person import (
@@ -23,6 +20,8 @@ from motion_transfer.drawing.person import (
     isolate,
     occupancy,
 )
+from motion_transfer.drawing.textures import enlarge, merge_textures, pick_nearest
+from motion_transfer.drawing.unfolding import extract_texture, keep_parts
 from motion_transfer.drawing.views import View, merge_views, rate_texels
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.blends import BlendMeter
@@ -30,8 +29,7 @@ from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.media.nearest import take_nearest
 from motion_transfer.media.pictures.photo import Photo
-from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures
-from nhrr_core.parts import ALL_PARTS, PART_NAMES
+from nhrr_core import ALL_PARTS, PART_NAMES, load_uv_tables
 
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
 CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
@@ -68,8 +66,8 @@ class Source:
         photo: The picture, upright.
         iuv: H x W x 3 uint8, of the chosen person only.
         iuv_path: None where it was estimated.
-        texture: 1 x 3 x T x T in [-1, 1], 0 where nothing is seen.
-        visibility: 1 x 1 x T x T, 1 where the texture is seen.
+        texture: 3 x T x T in [-1, 1], 0 where nothing is seen.
+        visibility: 1 x T x T, 1 where the texture is seen.
         alpha: How much of each pixel is the person, 0..255, where the IUV was estimated.
         clearance: Of clothes and hair, see `nhrr_core.unfold_clearance`; 0 where it is not known.
         notes: What the user should know of how the photos are read, in sentences.
@@ -79,10 +77,10 @@ class Source:
     photo: Photo
     iuv: UInt8[np.ndarray, "H W 3"]
     iuv_path: Path | None
-    texture: Float[Tensor, "1 3 T T"]
-    visibility: Float[Tensor, "1 1 T T"]
+    texture: Float32[np.ndarray, "3 T T"]
+    visibility: Float32[np.ndarray, "1 T T"]
     alpha: UInt8[np.ndarray, "H W"] | None = None
-    clearance: Float[Tensor, "1 2 128 128"] | None = None
+    clearance: Float32[np.ndarray, "2 128 128"] | None = None
     notes: tuple[str, ...] = ()
     kept: Path | None = None
 
@@ -123,10 +121,10 @@ def undress(source: Source, parts: Collection[int]) -> Source:
     """
     if not parts:
         return source
-    taken = torch.isin(load_uv_layout().part, torch.tensor(sorted(parts)))[None, None].float()
+    kept = ~np.isin(load_uv_tables().part, sorted(parts))
 
-    def left(values: Tensor) -> Tensor:
-        return values * (1 - F.interpolate(taken, values.shape[2:], mode="nearest-exact"))
+    def left(values: Float32[np.ndarray, "C t t"]) -> Float32[np.ndarray, "C t t"]:
+        return values * pick_nearest(kept, values.shape[-1])
 
     return replace(
         source,
@@ -157,7 +155,7 @@ def dress(source: Source, garments: Sequence[SourcePicture]) -> Source:
     clearances = [_clearance(garment) for garment in garments]
     if source.clearance is not None:
         clearances.insert(0, source.clearance)
-    clearance = torch.cat(merge_textures([(c[:, :1], c[:, 1:]) for c in clearances]), dim=1)
+    clearance = np.concatenate(merge_textures([(c[:1], c[1:]) for c in clearances]))
     notes = [*source.notes, *(note for garment in garments for note in _list_notes(garment))]
     return replace(
         source,
@@ -183,9 +181,8 @@ def unfold_views(
         if len(pictures) == 1 and not rated:  # nothing to compare with
             return [View(str(picture.photo.path), texture, visibility, visibility)]
         rating = rate_texels(picture.photo.rgb, picture.iuv)
-        fine = F.interpolate(rating, (texture_size, texture_size), mode="bilinear")
         # seen at all is more than not seen, also where few pixels fall
-        rating = fine.clamp_min(LEAST_RATING) * visibility
+        rating = np.maximum(enlarge(rating, texture_size), LEAST_RATING) * visibility
         views.append(View(str(picture.photo.path), texture, visibility, rating))
     return views
 
@@ -199,15 +196,15 @@ def tell_strangers(pictures: Sequence[SourcePicture], strangers: Sequence[int]) 
     ]
 
 
-def _clearance(picture: SourcePicture) -> Float[Tensor, "1 2 128 128"]:
+def _clearance(picture: SourcePicture) -> Float32[np.ndarray, "2 128 128"]:
     return clearance_of(picture.photo, picture.iuv, picture.parts, alpha=picture.alpha)
 
 
-def _mean_clearance(pictures: Sequence[SourcePicture]) -> Float[Tensor, "1 2 128 128"]:
+def _mean_clearance(pictures: Sequence[SourcePicture]) -> Float32[np.ndarray, "2 128 128"]:
     """The mean of what each photo measures along its own outline."""
-    lengths, known = torch.stack([_clearance(picture) for picture in pictures]).split(1, dim=2)
+    lengths, known = np.stack([_clearance(picture) for picture in pictures], axis=1)
     count = known.sum(0)
-    return torch.cat([(lengths * known).sum(0) / count.clamp_min(1), count.clamp_max(1)], dim=1)
+    return np.stack([(lengths * known).sum(0) / np.maximum(count, 1), np.minimum(count, 1)])
 
 
 def _list_notes(picture: SourcePicture) -> list[str]:
@@ -219,14 +216,14 @@ def _list_notes(picture: SourcePicture) -> list[str]:
 
 def unfold_picture(
     picture: SourcePicture, texture_size: int
-) -> tuple[Float[Tensor, "1 3 T T"], Float[Tensor, "1 1 T T"]]:
+) -> tuple[Float32[np.ndarray, "3 T T"], Float32[np.ndarray, "1 T T"]]:
     """Unfold a photo, at its full resolution, into a partial texture in [-1, 1] and visibility."""
     photo, iuv = picture.photo, picture.iuv
     alpha = photo.alpha if picture.alpha is None else picture.alpha
     box = bounding_box(iuv)
     if not box.area:
-        blank = torch.zeros(1, 1, texture_size, texture_size)
-        return blank.expand(-1, 3, -1, -1), blank
+        blank = np.zeros((4, texture_size, texture_size), np.float32)
+        return blank[:3], blank[3:]
     # nothing farther away is looked at: of a large photo that saves most of the work
     margin = round((box.height - 1) * SURROUNDINGS_SHARE)
     body = np.s_[
@@ -235,9 +232,8 @@ def unfold_picture(
     ]
     rgb, own = np.ascontiguousarray(photo.rgb[body]), np.ascontiguousarray(iuv[body])
     trimmed = trim_outline(rgb, own) if alpha is None else trim_to_alpha(own, alpha[body])
-    tensors = [torch.from_numpy(image).permute(2, 0, 1)[None] for image in (rgb, trimmed)]
-    colours, body_iuv = tensors[0].float() / 127.5 - 1, keep_parts(tensors[1], picture.parts)
-    return extract_texture(colours, body_iuv, load_uv_layout().charts, texture_size)
+    colours = rgb / np.float32(127.5) - 1
+    return extract_texture(colours, keep_parts(trimmed, picture.parts), texture_size)
 
 
 def trim_to_alpha(

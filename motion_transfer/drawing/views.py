@@ -14,14 +14,14 @@ from itertools import combinations
 
 import cv2
 import numpy as np
-import torch
-import torch.nn.functional as F
-from jaxtyping import Bool, Float, Float32, Int64, UInt8
-from torch import Tensor
+from jaxtyping import Bool, Float, Float32, UInt8
+from numpy.lib.stride_tricks import sliding_window_view
 
 from motion_transfer.drawing.person import bounding_box
-from nhrr_core import PART_GROUPS, load_uv_layout, texture_coordinates
-from nhrr_core.texture import resize_twins
+from motion_transfer.drawing.textures import average, enlarge, pick_nearest, twins
+from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
+from nhrr_core import PART_COUNT, PART_GROUPS, load_uv_tables
+from nhrr_core.uv_tables import TWIN_SIZE
 
 HEAD = PART_GROUPS["head"]
 
@@ -47,7 +47,7 @@ SURE_SHARE = 0.3
 """Of a photo's best rating on a part of the body: what all but the first see worse is left out."""
 
 EARS_METRES = 0.02
-"""What lies farther ahead on the head is the face; see `UVLayout.position`."""
+"""What lies farther ahead on the head is the face; see `UVTables.position`."""
 
 WIDE, NARROW = 4, 8
 """Powers of the ratings by which colours, and patterns on them, are mixed."""
@@ -91,16 +91,16 @@ class View:
 
     Attributes:
         name: Of the photo, for messages.
-        texture: 1 x 3 x T x T in [-1, 1], 0 where nothing is seen.
-        visibility: 1 x 1 x T x T, 1 where the texture is seen.
-        rating: 1 x 1 x T x T, how well each texel is seen, in pixels of the photo along the side of
+        texture: 3 x T x T in [-1, 1], 0 where nothing is seen.
+        visibility: 1 x T x T, 1 where the texture is seen.
+        rating: 1 x T x T, how well each texel is seen, in pixels of the photo along the side of
             a texel of 256 x 256; 0 where it is not.
     """
 
     name: str
-    texture: Float[Tensor, "1 3 T T"]
-    visibility: Float[Tensor, "1 1 T T"]
-    rating: Float[Tensor, "1 1 T T"]
+    texture: Float32[np.ndarray, "3 T T"]
+    visibility: Float32[np.ndarray, "1 T T"]
+    rating: Float32[np.ndarray, "1 T T"]
 
 
 @dataclass(frozen=True)
@@ -114,9 +114,9 @@ class MergedViews:
         strangers: The photos that seem to show somebody else, or other clothes, by index.
     """
 
-    texture: Float[Tensor, "1 3 T T"]
-    visibility: Float[Tensor, "1 1 T T"]
-    shares: Float[Tensor, "K T T"]
+    texture: Float32[np.ndarray, "3 T T"]
+    visibility: Float32[np.ndarray, "1 T T"]
+    shares: Float32[np.ndarray, "K T T"]
     strangers: tuple[int, ...] = ()
 
 
@@ -132,66 +132,63 @@ def merge_views(views: Sequence[View]) -> MergedViews:
     """
     if len(views) == 1:
         only = views[0]
-        return MergedViews(only.texture, only.visibility, only.visibility[0])
+        return MergedViews(only.texture, only.visibility, only.visibility)
     first, *others = equalise_light(views)
     views = [first, *map(_keep_sure, others)]
-    texture = torch.cat([view.texture for view in views])
-    seen = torch.cat([view.visibility for view in views])
-    rating = torch.cat([view.rating for view in views])
+    texture, seen, rating = (
+        np.stack([getattr(view, name) for view in views])
+        for name in ("texture", "visibility", "rating")
+    )
     rating[0] *= LEAD
     head, face = _mark_head(texture.shape[-1])
     on_face = (rating * face).sum((1, 2, 3))
-    rating[on_face.argmax()] *= torch.where(head, FACE_LEAD, 1.0)
-    cell = round(texture.shape[-1] * BAND_SHARE)
-    colours, around = _smooth(texture, seen, cell)
-    wide = _to_shares(_smooth(rating, torch.ones_like(seen), cell)[0] * (around > 0), WIDE)
+    rating[on_face.argmax()] *= np.where(head, np.float32(FACE_LEAD), 1)
+    cells = round(1 / BAND_SHARE)
+    colours, around = _smooth(texture, seen, cells)
+    wide = _to_shares(_smooth(rating, np.ones_like(seen), cells)[0] * (around > 0), WIDE)
     narrow = _to_shares(rating, NARROW)
-    shown = seen.amax(0, keepdim=True)
+    shown = seen.max(0)
     patterns = (texture - colours) * seen
-    merged = (wide * colours).sum(0, keepdim=True) + (narrow * patterns).sum(0, keepdim=True)
+    merged = (wide * colours).sum(0) + (narrow * patterns).sum(0)
     return MergedViews(
-        merged.clamp(-1, 1) * shown, shown, narrow[:, 0] * shown[0], find_strangers(views)
+        merged.clip(-1, 1) * shown, shown, narrow[:, 0] * shown, find_strangers(views)
     )
 
 
 def _keep_sure(view: View) -> View:
     """Leave out what a photo sees much worse than the best of the same part: hands, backdrop."""
-    part = _parts(view.texture.shape[-1])
-    rating = view.rating.flatten()
-    best = torch.zeros(int(part.max()) + 1).scatter_reduce(0, part.flatten(), rating, "amax")
-    sure = (view.rating >= SURE_SHARE * best[part]) * view.visibility
+    part = pick_nearest(load_uv_tables().part, view.texture.shape[-1])
+    best = np.zeros(PART_COUNT + 1, np.float32)
+    np.maximum.at(best, part, view.rating[0])
+    sure = (view.rating >= np.float32(SURE_SHARE) * best[part]) * view.visibility
     return replace(view, texture=view.texture * sure, visibility=sure, rating=view.rating * sure)
 
 
-def _parts(size: int) -> Int64[Tensor, "T T"]:
-    part = load_uv_layout().part[None, None].float()
-    return F.interpolate(part, (size, size))[0, 0].long()
-
-
-def _mark_head(size: int) -> tuple[Bool[Tensor, "T T"], Bool[Tensor, "T T"]]:
+def _mark_head(size: int) -> tuple[Bool[np.ndarray, "T T"], Bool[np.ndarray, "T T"]]:
     """Mark the texels of the head, and those of its face."""
-    layout = load_uv_layout()
-    head = torch.isin(layout.part, torch.tensor(HEAD))
-    both = torch.stack([head, head & (layout.position[..., 2] > EARS_METRES)])
-    head, face = F.interpolate(both[None].float(), (size, size))[0] > 0
-    return head, face
+    tables = load_uv_tables()
+    head = np.isin(tables.part, HEAD)
+    face = head & (tables.position[..., 2] > EARS_METRES)
+    return pick_nearest(head, size), pick_nearest(face, size)
 
 
 def _smooth(
-    values: Float[Tensor, "K C T T"], weight: Float[Tensor, "K 1 T T"], cell: int
-) -> tuple[Float[Tensor, "K C T T"], Float[Tensor, "K 1 T T"]]:
+    values: Float32[np.ndarray, "K C T T"], weight: Float32[np.ndarray, "K 1 T T"], cells: int
+) -> tuple[Float32[np.ndarray, "K C T T"], Float32[np.ndarray, "K 1 T T"]]:
     """Means over cells of what counts, and between them; and how much of it there is around."""
-    total = F.avg_pool2d(torch.cat([values * weight, weight], dim=1), cell)
-    wide = F.interpolate(total, scale_factor=cell, mode="bilinear", align_corners=False)
+    counted = np.concatenate([values * weight, weight], axis=1)
+    wide = np.stack([enlarge(average(each, cells), each.shape[-1]) for each in counted])
     mass = wide[:, -1:]
-    return wide[:, :-1] / mass.clamp_min(1e-6), mass
+    return wide[:, :-1] / np.maximum(mass, 1e-6), mass
 
 
-def _to_shares(rating: Float[Tensor, "K 1 T T"], power: int) -> Float[Tensor, "K 1 T T"]:
+def _to_shares(
+    rating: Float32[np.ndarray, "K 1 T T"], power: int
+) -> Float32[np.ndarray, "K 1 T T"]:
     """Shares of each place that add up to 1; equal ones where nobody sees it."""
-    best = rating.amax(0, keepdim=True)
-    weight = torch.where(best > 0, rating / best.clamp_min(1e-9), 1.0) ** power
-    return weight / weight.sum(0, keepdim=True)
+    best = rating.max(0)
+    weight = np.where(best > 0, rating / np.maximum(best, 1e-9), 1) ** power
+    return weight / weight.sum(0)
 
 
 def equalise_light(views: Sequence[View]) -> list[View]:
@@ -205,35 +202,34 @@ def equalise_light(views: Sequence[View]) -> list[View]:
     project's.
     """
     count = len(views)
-    logs = [_to_light(view).flatten(1).clamp_min(1e-6).log() for view in views]
-    told = [_told(view).flatten() for view in views]
+    logs = [_to_light(view).reshape(3, -1) for view in views]
+    told = [_told(view).ravel() for view in views]
     size = views[0].texture.shape[-1]
-    layout = load_uv_layout()
-    side, depth = (resize_twins(twin, size) for twin in (layout.side_twin, layout.depth_twin))
-    same = torch.arange(size**2)
+    side, depth = twins(size)
+    same = np.arange(size**2)
     # rows of least squares problems: each photo's light is near to the first's ...
     rows, wanted = [np.eye(count)[1:] / EXPOSURE_SPREAD], [np.zeros((count - 1, 3))]
     for one, other in combinations(range(count), 2):
         for places, spread in (((same,), SHADE_SPREAD), ((depth, side[depth]), TWIN_SPREAD)):
             both = [told[one] & told[other][place] for place in places]
-            ratios = torch.cat(
+            ratios = np.concatenate(
                 [
                     logs[one][:, kept] - logs[other][:, place[kept]]
                     for place, kept in zip(places, both, strict=True)
                 ],
-                dim=1,
+                axis=1,
             )
             share = ratios.shape[1] / size**2
             if share < LEAST_SHARE:  # the few twins of head and trunk are skin and shirt
                 continue
             # ... and two photos agree on what both show
-            ratio = ratios.median(1, keepdim=True).values
-            scatter = float((ratios - ratio).abs().median())
+            ratio = np.median(ratios, axis=1, keepdims=True)
+            scatter = float(np.median(np.abs(ratios - ratio)))
             trust = (share / (share + COMMON_SHARE) / (spread**2 + scatter**2)) ** 0.5
             row = np.zeros((1, count))
             row[0, one], row[0, other] = trust, -trust
             rows.append(row)
-            wanted.append(-trust * ratio.double().numpy().T)
+            wanted.append(-trust * ratio.T.astype(np.float64))
     system, found = np.concatenate(rows)[:, 1:], np.concatenate(wanted)  # the first's light stays
     exposure = np.linalg.lstsq(system, found.mean(1, keepdims=True))[0]
     # cameras differ less in white balance than in exposure
@@ -243,20 +239,21 @@ def equalise_light(views: Sequence[View]) -> list[View]:
     return [views[0], *(_relight(view, gain) for view, gain in zip(views[1:], gains, strict=True))]
 
 
-def _to_light(view: View) -> Float[Tensor, "3 T T"]:
-    return ((view.texture[0] + 1) / 2).clamp_min(0) ** GAMMA
+def _to_light(view: View) -> Float32[np.ndarray, "3 T T"]:
+    """The logarithm of each place's light."""
+    return GAMMA * np.log(np.maximum((view.texture + 1) / 2, 1e-6 ** (1 / GAMMA)))
 
 
-def _told(view: View) -> Bool[Tensor, "T T"]:
+def _told(view: View) -> Bool[np.ndarray, "T T"]:
     """Where a photo tells of the light: inside its edges, neither black nor burnt out."""
-    rating, colours = view.rating[0, 0], (view.texture[0] + 1) / 2
+    rating, colours = view.rating[0], (view.texture + 1) / 2
     kept = ((colours > DIM) & (colours < BRIGHT)).all(0)
-    return (rating > rating.max() * TOLD_SHARE) & (view.visibility[0, 0] > 0) & kept
+    return (rating > rating.max() * TOLD_SHARE) & (view.visibility[0] > 0) & kept
 
 
 def _relight(view: View, gain: Float[np.ndarray, " 3"]) -> View:
-    factors = torch.from_numpy(np.exp(gain / GAMMA)).float()[None, :, None, None]
-    lit = ((view.texture + 1) / 2 * factors).clamp(0, 1) * 2 - 1
+    factors = np.exp(gain / GAMMA).astype(np.float32)[:, None, None]
+    lit = ((view.texture + 1) / 2 * factors).clip(0, 1) * 2 - 1
     return replace(view, texture=lit * view.visibility)
 
 
@@ -269,54 +266,40 @@ def find_strangers(views: Sequence[View]) -> tuple[int, ...]:
     Args:
         views: Under one light, see `equalise_light`.
     """
-    cell = round(views[0].texture.shape[-1] * BAND_SHARE / 2)
-    means = [F.avg_pool2d(view.texture * view.visibility, cell)[0] for view in views]
-    seen = [F.avg_pool2d(view.visibility, cell)[0, 0] for view in views]
+    cells = round(2 / BAND_SHARE)
+    means = [average(view.texture * view.visibility, cells) for view in views]
+    seen = [average(view.visibility, cells)[0] for view in views]
     found = []
     for index in range(1, len(views)):
         both = (seen[0] > 0.5) & (seen[index] > 0.5)
-        if float(both.float().mean()) < STRANGER_SHARE:
+        if both.mean() < STRANGER_SHARE:
             continue
         one, other = (means[i][:, both] / seen[i][both] for i in (0, index))
-        if float((one - other).abs().mean(0).median()) / 2 > STRANGER:
+        if np.median(np.abs(one - other).mean(0)) / 2 > STRANGER:
             found.append(index)
     return tuple(found)
 
 
 def rate_texels(
     rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
-) -> Float[Tensor, "1 1 64 64"]:
+) -> Float32[np.ndarray, "1 64 64"]:
     """Rate how well a photo sees each of RATED_SIZE x RATED_SIZE texels, see `View.rating`."""
     box = bounding_box(iuv)
     if not box.area:
-        return torch.zeros(1, 1, RATED_SIZE, RATED_SIZE)
+        return np.zeros((1, RATED_SIZE, RATED_SIZE), np.float32)
     rgb, iuv = rgb[box.slices], iuv[box.slices]
-    place, row, column = _body(iuv)
-    texel = _texels(place, RATED_SIZE)
-    trust = torch.from_numpy(trust_pixels(iuv)[row, column]).double()
+    body = iuv[..., 0] > 0
+    texel = texel_index(texture_coordinates(iuv[body]), RATED_SIZE)
     count, trusted = (
-        torch.bincount(texel, weights=weight, minlength=RATED_SIZE**2)
-        for weight in (torch.ones_like(trust), trust)
+        np.bincount(texel, weights, RATED_SIZE**2) for weights in (None, trust_pixels(iuv)[body])
     )
-    hit = (count > 0).double()
     # means of three by three texels that are hit: 8-bit UV lays too many pixels into some
-    sums = torch.stack([count, trusted, hit]).view(1, 3, RATED_SIZE, RATED_SIZE)
-    count, trusted, around = F.avg_pool2d(sums, 3, 1, 1).split(1, dim=1)
-    side = (count / around.clamp_min(1e-9)).sqrt() * RATED_SIZE / 256
-    rating = side * trusted / count.clamp_min(1e-9) * hit.view_as(side)
-    return (rating * measure_sharpness(rgb, iuv)).float()
-
-
-def _body(iuv: UInt8[np.ndarray, "H W 3"]) -> tuple[Tensor, np.ndarray, np.ndarray]:
-    """The places in the texture, (x, y), of the body's pixels; and their rows and columns."""
-    row, column = iuv[..., 0].nonzero()
-    pixels = torch.from_numpy(np.ascontiguousarray(iuv[row, column].T))[None, :, None]
-    return texture_coordinates(pixels, load_uv_layout().charts)[0, 0], row, column
-
-
-def _texels(place: Float[Tensor, "N 2"], size: int) -> Tensor:
-    column, row = (place * size).long().clamp_(0, size - 1).unbind(1)
-    return row * size + column
+    sums = np.stack([count, trusted, count > 0]).reshape(3, RATED_SIZE, RATED_SIZE)
+    around = sliding_window_view(np.pad(sums, ((0, 0), (1, 1), (1, 1))), (3, 3), axis=(1, 2))
+    count, trusted, hit = around.mean((3, 4))
+    side = np.sqrt(count / np.maximum(hit, 1e-9)) * RATED_SIZE / 256
+    rating = side * trusted / np.maximum(count, 1e-9) * sums[2:]
+    return (rating * measure_sharpness(rgb, iuv)).astype(np.float32)
 
 
 def trust_pixels(iuv: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W"]:
@@ -324,12 +307,11 @@ def trust_pixels(iuv: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W"]:
 
     An edge is the person's outline, and where one part of the body covers another.
     """
-    place, row, column = _body(iuv)
-    layout = load_uv_layout()
-    size = layout.position.shape[0]
+    body = iuv[..., 0] > 0
+    texel = texel_index(texture_coordinates(iuv[body]), TWIN_SIZE)
     where = np.full((*iuv.shape[:2], 3), np.inf, np.float32)  # the background is far from all
-    where[row, column] = layout.position.view(-1, 3)[_texels(place, size)].numpy()
-    inner = (iuv[..., 0] > 0).astype(np.uint8)
+    where[body] = load_uv_tables().position.reshape(-1, 3)[texel]
+    inner = body.astype(np.uint8)
     for axis in (0, 1):
         with np.errstate(invalid="ignore"):  # background beside background
             far = np.linalg.norm(np.diff(where, axis=axis), axis=-1) > EDGE_METRES

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from motion_transfer.drawing.kept_source import save_source
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, DRAFT, RENDERERS
 from motion_transfer.errors import OutputError
@@ -40,7 +38,7 @@ def keep_source(options: KeepOptions, output: Path, listener: Listener = ignore)
     sources = read_sources(options, tuple(dict.fromkeys(sizes)), listener)
     for note in sources[0].notes:
         listener(Notice(note))
-    features = torch.from_numpy(recipe.appearance_of(sources[0]))
+    features = recipe.appearance_of(sources[0])
     facts = {"made of": _tell_pictures(options), "weights": recipe.facts()}
     with work_folder(output) as folder:
         written = folder / output.name

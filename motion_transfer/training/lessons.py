@@ -19,20 +19,21 @@ from typing import Protocol
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.outline import stand_out
 from motion_transfer.drawing.person import bounding_box, occupancy
 from motion_transfer.drawing.source import Source, SourcePicture, unfold_source, unfold_views
+from motion_transfer.drawing.textures import average
+from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
 from motion_transfer.drawing.views import equalise_light
 from motion_transfer.drawing.window import DRAWN_UNSCALED, SIDE_STEP, Window, plan_window
 from motion_transfer.training.metrics import SHOWN_TEXELS
 from motion_transfer.training.pictures import Image, Plane
 from motion_transfer.training.samples import BEYOND_THE_PHOTO, cut_picture, to_tensor
 from motion_transfer.training.step import Batch
-from nhrr_core import NeuralReRenderer, load_uv_layout, texture_coordinates
+from nhrr_core import NeuralReRenderer
 from nhrr_core.config import COLOUR_CHANNELS
 
 Gains = Float64[np.ndarray, " 3"]
@@ -151,13 +152,13 @@ class Lessons:
 
     def _encode(self, source: Source) -> Float[Tensor, "1 D T T"]:
         """Compute the feature map of a source as a run would."""
-        clearance, device = source.clearance, self._device
+        texture, visibility = map(self._take, (source.texture, source.visibility))
+        clearance = None if source.clearance is None else self._take(source.clearance)
         with torch.no_grad():
-            return self._model.encode_texture(
-                source.texture.to(device),
-                source.visibility.to(device),
-                None if clearance is None else clearance.to(device),
-            )
+            return self._model.encode_texture(texture, visibility, clearance)
+
+    def _take(self, values: Float[np.ndarray, "C T T"]) -> Float[Tensor, "1 C T T"]:
+        return torch.from_numpy(values)[None].to(self._device)
 
     def _draw(self, likeness: Likeness) -> Batch:
         """Cut a photo, at a size and a place that are left to chance."""
@@ -211,7 +212,7 @@ class Lessons:
         if not crops:
             return []
         source = self._unfold(self._pictures)
-        seen = F.adaptive_max_pool2d(source.visibility, SHOWN_TEXELS)[0, 0] > 0
+        seen = average(source.visibility, SHOWN_TEXELS)[0] > 0
         hidden = np.array([np.count_nonzero(hidden_pixels(iuv, seen)) for iuv in crops])
         fit = np.flatnonzero(hidden >= HIDDEN_ENOUGH * hidden.max())
         spread = np.linspace(0, len(fit) - 1, self._settings.held_poses).round().astype(int)
@@ -240,9 +241,9 @@ def give_one_light(pictures: Sequence[SourcePicture]) -> list[SourcePicture]:
     before = unfold_views(pictures, size)
     relit = []
     for picture, own, other in zip(pictures, before, equalise_light(before), strict=True):
-        seen = own.visibility[0, 0] > 0
-        means = [(view.texture[0][:, seen].double() + 1).mean(1) for view in (other, own)]
-        relit.append(relight(picture, (means[0] / means[1].clamp_min(1e-6)).numpy()))
+        seen = own.visibility[0] > 0
+        means = [(view.texture[:, seen] + 1).mean(1, np.float64) for view in (other, own)]
+        relit.append(relight(picture, means[0] / np.maximum(means[1], 1e-6)))
     return relit
 
 
@@ -272,12 +273,10 @@ def take_portrait(picture: SourcePicture, *, alpha: bool) -> Portrait:
     return Portrait(picture.photo.rgb, picture.iuv, cover if alpha else None, plan_window([box]))
 
 
-def hidden_pixels(iuv: Image, seen: Bool[Tensor, "T T"]) -> Bool[np.ndarray, "H W"]:
+def hidden_pixels(iuv: Image, seen: Bool[np.ndarray, "T T"]) -> Bool[np.ndarray, "H W"]:
     """Mark the body's pixels whose texel is not among those that are seen."""
-    stacked = _stack(iuv)
-    place = texture_coordinates(stacked, load_uv_layout().charts)
-    column, row = (place * len(seen)).long().clamp(0, len(seen) - 1).unbind(-1)
-    return ((stacked[:, 0] > 0) & ~seen[row, column])[0].numpy()
+    texel = texel_index(texture_coordinates(iuv), len(seen))
+    return (iuv[..., 0] > 0) & ~seen.ravel()[texel]
 
 
 def lay_over_white(drawn: Float[Tensor, "B K H W"]) -> Float[Tensor, "B 3 H W"]:

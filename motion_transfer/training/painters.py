@@ -79,7 +79,7 @@ class Painter:
             trimmed = trim_to_alpha(picture.iuv, picture.alpha)
             flat = (picture.rgb, trimmed, crop.rgb, crop.iuv, crop.alpha[..., None])
             photo, photo_iuv, image, iuv, alpha = (plane.transpose(2, 0, 1) for plane in flat)
-            views.append((photo, photo_iuv, clearance[0].half().numpy(), image, iuv, alpha))
+            views.append((photo, photo_iuv, clearance.astype(np.float16), image, iuv, alpha))
         return PaintedPerson(*(np.stack(planes) for planes in zip(*views, strict=True)))
 
 

@@ -108,7 +108,7 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         if source:
             known = random is None or random.random() >= UNKNOWN_CLEARANCE
             sample["source_clearance"] = (
-                clearance_of(source.as_photo(), source.iuv, ALL_PARTS)[0]
+                torch.from_numpy(clearance_of(source.as_photo(), source.iuv, ALL_PARTS))
                 if known
                 else torch.zeros(CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
             )
@@ -142,9 +142,8 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             return kept.rgb, kept.alpha
         whole = loaded or picture.load()
         texture, visibility = unfold_picture(SourcePicture(whole.as_photo(), whole.iuv), size)
-        rgb = ((texture[0] + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
-        rgb = rgb.permute(1, 2, 0).numpy()
-        seen = ((visibility[0, 0] > 0).to(torch.uint8) * 255).numpy()
+        levels = ((texture + 1) * 127.5).round().clip(0, 255).astype(np.uint8)
+        rgb, seen = levels.transpose(1, 2, 0), (visibility[0] > 0) * np.uint8(255)
         if path:  # several processes may keep it at once; the file appears whole
             # texture and visibility as one RGBA picture
             ok, encoded = cv2.imencode(".png", np.dstack([rgb[..., ::-1], seen]))

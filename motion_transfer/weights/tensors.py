@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from safetensors import deserialize, safe_open
 
-from motion_transfer.errors import InputError, WeightsError
+from motion_transfer.errors import InputError, WeightsError, first_line
 from motion_transfer.media.files import check_readable
 
 if TYPE_CHECKING:
@@ -162,8 +162,3 @@ def check_weights(path: Path, what: str) -> None:
         check_readable(path, what)
     except InputError as error:
         raise WeightsError(str(error)) from None
-
-
-def first_line(error: Exception) -> str:
-    """Tell a library's reason in one line, or its kind where it gives none."""
-    return next((line.strip() for line in str(error).splitlines() if line.strip()), repr(error))

@@ -210,7 +210,7 @@ def test_the_source_ends_where_alpha_does(red_model: Path, me: Path) -> None:
     options = SourceOptions(source=(me,), estimator="densepose", estimator_model=red_model)
     source = read_source(options, 64)
     assert source.alpha is not None and source.iuv_path is None
-    colours = source.texture[0].permute(1, 2, 0)[source.visibility[0, 0] > 0].numpy()
+    colours = source.texture[:, source.visibility[0] > 0].T
     reddish = (colours[:, 0] > 0.7) & (colours[:, 1:].max(1) < -0.7)
     assert reddish.mean() > 0.99  # nothing of the coffee
 

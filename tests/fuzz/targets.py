@@ -262,7 +262,7 @@ def _kept_sources(folder: Path) -> Iterator[Path]:
     photo = Photo(folder / "p.png", Studio(folder).dress(Studio(folder).iuv()), None, turned=False)
     source = unfold_source([SourcePicture(photo, Studio(folder).iuv())], 32)
     path = folder / "me.mtsource"
-    save_source(path, [source], {"0" * 64: torch.zeros(1, 4, 32, 32)}, {"made of": []})
+    save_source(path, [source], {"0" * 64: np.zeros((1, 4, 32, 32), np.float32)}, {"made of": []})
     yield path
 
 

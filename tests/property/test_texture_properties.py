@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from reference.nhrr_core_loops import extract_texture_loops, sample_features_loops
 from torch import Tensor
 
+from motion_transfer.drawing import unfolding
 from nhrr_core import extract_texture, keep_parts, load_uv_layout, merge_textures, sample_features
 
 CHARTS = load_uv_layout().charts
@@ -117,6 +118,16 @@ def test_texture_equals_loops(iuv: Tensor, size: int, seed: int) -> None:
     fast = extract_texture(photo, iuv, CHARTS, size)
     for a, b in zip(fast, extract_texture_loops(photo, iuv, CHARTS, size), strict=True):
         torch.testing.assert_close(a, b, rtol=0, atol=1e-5)
+
+
+@thorough
+@given(iuv_images(batch=1), SIZES, SEEDS)
+def test_texture_without_torch_equals_loops(iuv: Tensor, size: int, seed: int) -> None:
+    photo = photo_of(iuv, seed)
+    image, own_iuv = (each[0].permute(1, 2, 0).numpy() for each in (photo, iuv))
+    fast = unfolding.extract_texture(image, own_iuv, size)
+    for a, b in zip(fast, extract_texture_loops(photo, iuv, CHARTS, size), strict=True):
+        torch.testing.assert_close(torch.from_numpy(a)[None], b, rtol=0, atol=1e-5)
 
 
 @thorough

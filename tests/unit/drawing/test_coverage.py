@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 from jaxtyping import Bool
 
 from motion_transfer.drawing.coverage import (
@@ -20,17 +19,17 @@ from motion_transfer.drawing.coverage import (
     visible_from,
 )
 from motion_transfer.drawing.views import View
-from nhrr_core import load_uv_layout
+from nhrr_core import load_uv_tables
 
-PART = load_uv_layout().part.numpy()
+PART = load_uv_tables().part
 EVERYWHERE = np.ones(PART.shape, bool)
 MIRROR = {"front": "back", "back": "front", "left side": "right side", "right side": "left side"}
 
 
 def view(where: Bool[np.ndarray, "T T"], well: float = WELL, name: str = "photo") -> View:
     """A photo that shows some texels, all as well."""
-    visibility = torch.from_numpy(where).float()[None, None]
-    return View(name, visibility.expand(-1, 3, -1, -1) * 0.2, visibility, visibility * well)
+    visibility = where[None].astype(np.float32)
+    return View(name, visibility.repeat(3, axis=0) * 0.2, visibility, visibility * well)
 
 
 def parts(*numbers: int) -> Bool[np.ndarray, "T T"]:

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from safetensors import safe_open
-from safetensors.torch import load_file, save_file
+from safetensors.numpy import load_file, save_file
 
 from motion_transfer.drawing.kept_source import (
     FACTS,
@@ -23,11 +22,11 @@ from motion_transfer.drawing.kept_source import (
     load_source,
     save_source,
 )
-from motion_transfer.drawing.renderers.network import open_recipe
+from motion_transfer.drawing.renderers import RENDERERS
 from motion_transfer.drawing.source import Source, undress
 from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import Photo
-from nhrr_core import load_uv_layout
+from nhrr_core import load_uv_tables
 
 SIZE, COARSE, HEIGHT, WIDTH = 64, 16, 30, 20
 DIGEST, MAP = "ab" * 32, (1, 5, SIZE, SIZE)
@@ -41,19 +40,19 @@ def make_source(size: int = SIZE, *, alpha: bool = True) -> Source:
     iuv[..., 0] %= 25
     opacity = noise.integers(0, 256, (2, HEIGHT, WIDTH), dtype=np.uint8)
     photo_alpha, own_alpha = opacity if alpha else (None, None)
-    torch.manual_seed(size)
-    visibility = (torch.rand(1, 1, size, size) > 0.5).float()
-    texture = (torch.rand(1, 3, size, size) * 2 - 1) * visibility
-    clearance = torch.randn(1, 2, 128, 128)
-    clearance[:, 1] = (clearance[:, 1] > 0).float()
+    noise = np.random.default_rng(size)
+    visibility = noise.integers(0, 2, (1, size, size)).astype(np.float32)
+    texture = noise.uniform(-1, 1, (3, size, size)).astype(np.float32) * visibility
+    clearance = noise.standard_normal((2, 128, 128), np.float32)
+    clearance[1] = clearance[1] > 0
     photo = Photo(Path("me.jpg"), rgb, photo_alpha, turned=True, profile="P3")
     return Source(
         photo, iuv, Path("me_IUV.png"), texture, visibility, own_alpha, clearance, ("a note",)
     )
 
 
-def make_features() -> dict[str, torch.Tensor]:
-    return {DIGEST: torch.randn(MAP, generator=torch.Generator().manual_seed(1))}
+def make_features() -> dict[str, np.ndarray]:
+    return {DIGEST: np.random.default_rng(1).standard_normal(MAP, np.float32)}
 
 
 @pytest.fixture
@@ -93,9 +92,9 @@ def test_features_are_those_of_the_very_weights(kept: Path) -> None:
 
 def test_a_kept_feature_map_is_not_computed_again(tmp_path: Path, checkpoint: Path) -> None:
     """But where garments, or parts taken away, have changed the source."""
-    recipe = open_recipe(checkpoint)
+    recipe = RENDERERS["nhrr"].recipe(checkpoint)
     source = make_source()
-    marked = torch.full(recipe.appearance_of(source).shape, 7.0)
+    marked = np.full(recipe.appearance_of(source).shape, 7, np.float32)
     path = tmp_path / "me.mtsource"
     save_source(path, [source], {recipe.content: marked}, {})
     kept = load_source(path, SIZE)
@@ -104,10 +103,10 @@ def test_a_kept_feature_map_is_not_computed_again(tmp_path: Path, checkpoint: Pa
     again = recipe.appearance_of(bare)
     assert (again != 7).any()
     np.testing.assert_array_equal(again, recipe.appearance_of(undress(source, [2])))
-    torso = load_uv_layout().part[2::4, 2::4] == 2  # the middles of texels of SIZE
-    assert kept.visibility[0, 0][torso].any()
-    assert not bare.visibility[0, 0][torso].any()
-    assert torch.equal(bare.texture[0][:, ~torso], kept.texture[0][:, ~torso])
+    torso = load_uv_tables().part[2::4, 2::4] == 2  # the middles of texels of SIZE
+    assert kept.visibility[0][torso].any()
+    assert not bare.visibility[0][torso].any()
+    np.testing.assert_array_equal(bare.texture[:, ~torso], kept.texture[:, ~torso])
 
 
 def test_the_same_source_gives_the_same_bytes(kept: Path, tmp_path: Path) -> None:
@@ -120,14 +119,14 @@ def test_the_same_source_gives_the_same_bytes(kept: Path, tmp_path: Path) -> Non
 def test_another_size_is_made_from_the_finest(kept: Path) -> None:
     finest = make_source()
     half = load_source(kept, SIZE // 2)
-    places = finest.visibility.view(1, 1, SIZE // 2, 2, SIZE // 2, 2).amax((3, 5))
-    assert torch.equal(half.visibility, places)
+    places = finest.visibility.reshape(1, SIZE // 2, 2, SIZE // 2, 2).max((2, 4))
+    np.testing.assert_array_equal(half.visibility, places)
     assert half.notes == ("a note",)
     double = load_source(kept, SIZE * 2)
-    assert torch.equal(double.texture[..., ::2, ::2], finest.texture)
+    np.testing.assert_array_equal(double.texture[..., ::2, ::2], finest.texture)
     assert "saved with 64 texels a side, and these weights use 128" in double.notes[1]
     odd = load_source(kept, 48)
-    assert odd.texture.shape == (1, 3, 48, 48)
+    assert odd.texture.shape == (3, 48, 48)
     assert not (odd.texture * (1 - odd.visibility)).any()
 
 
@@ -138,37 +137,56 @@ def test_what_it_says_of_itself(kept: Path) -> None:
     assert told["tensors"]["texture/64"] == "F32 [3, 64, 64]"
 
 
-def change(path: Path, facts: dict | None = None, **tensors: torch.Tensor | None) -> None:
+def change(path: Path, facts: dict | None = None, **tensors: np.ndarray | None) -> None:
     """Write the file again with other tensors (None: without one) or facts."""
     before = load_file(path)
     held = {name: tensors.get(name.replace("/", "_"), tensor) for name, tensor in before.items()}
-    with safe_open(path, "pt") as file:
+    with safe_open(path, "np") as file:
         told = json.loads(file.metadata()[FACTS])
     held = {name: tensor for name, tensor in held.items() if tensor is not None}
     save_file(held, path, metadata={FACTS: json.dumps({**told, **(facts or {})})})
 
 
-def bytes_of(text: bytes) -> torch.Tensor:
-    return torch.frombuffer(bytearray(text), dtype=torch.uint8)
+def floats(value: float, shape: tuple[int, ...]) -> np.ndarray:
+    return np.full(shape, value, np.float32)
 
 
-NAN = torch.full((3, SIZE, SIZE), torch.nan)
+def bytes_of(text: bytes) -> np.ndarray:
+    return np.frombuffer(text, np.uint8)
+
+
+SHAPE = (3, SIZE, SIZE)
 DAMAGE = {
     "no photo": ({"photo": None}, "photo is missing"),
     "no texture": ({"texture_64": None, "texture_16": None}, "it has no texture"),
     "no visibility": ({"visibility_64": None}, "visibility/64 is missing"),
-    "half the colours": ({"texture_64": torch.zeros(2, SIZE, SIZE)}, "texture/64 is F32"),
-    "other numbers": ({"texture_64": torch.zeros(3, SIZE, SIZE).half()}, "texture/64 is F16"),
-    "no numbers": ({"texture_64": NAN}, "texture/64 holds values that are no finite"),
-    "too bright": ({"texture_64": torch.ones(3, SIZE, SIZE) * 2}, "beyond black or white"),
-    "unseen colours": ({"texture_64": torch.ones(3, SIZE, SIZE)}, "colours where nothing is seen"),
+    "half the colours": (
+        {"texture_64": floats(0, (2, SIZE, SIZE))},
+        "texture/64 is F32",
+    ),
+    "other numbers": ({"texture_64": np.zeros(SHAPE, np.float16)}, "texture/64 is F16"),
+    "no numbers": (
+        {"texture_64": floats(np.nan, SHAPE)},
+        "texture/64 holds values that are no finite",
+    ),
+    "too bright": (
+        {"texture_64": floats(2, SHAPE)},
+        "beyond black or white",
+    ),
+    "unseen colours": (
+        {"texture_64": floats(1, SHAPE)},
+        "colours where nothing is seen",
+    ),
     "half seen": (
-        {"visibility_64": torch.full((1, SIZE, SIZE), 2, dtype=torch.uint8)},
+        {"visibility_64": np.full((1, SIZE, SIZE), 2, np.uint8)},
         "neither 0 nor 1",
     ),
-    "a clearance of another size": ({"clearance": torch.zeros(2, 64, 64)}, "clearance is F32"),
+    "a clearance of another size": (
+        {"clearance": floats(0, (2, 64, 64))},
+        "clearance is F32",
+    ),
     "a photo that is none": ({"photo": bytes_of(b"GIF89a")}, "a picture that is no PNG"),
-    "a photo of floats": ({"photo": torch.zeros(9)}, "photo is F32"),
+    "a photo of floats": ({"photo": floats(0, (9,))}, "photo is F32"),
 }
 
 

@@ -7,26 +7,26 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-import torch
-from torch import Tensor
+from jaxtyping import Float
 
 from motion_transfer.drawing.moments import LEAST_GAIN, MOST_MOMENTS, Moments
 
 SIDE = 8
+Rating = Float[np.ndarray, "1 S S"]
 
 
 class Frame:
     """Something that a moment holds; unlike a string, it can be seen to be released."""
 
 
-def sees(*rows: int, well: float = 1.0) -> Tensor:
+def sees(*rows: int, well: float = 1.0) -> Rating:
     """A rating of some rows of the texture."""
-    rating = torch.zeros(1, 1, SIDE, SIDE)
-    rating[0, 0, list(rows)] = well
+    rating = np.zeros((1, SIDE, SIDE), np.float32)
+    rating[0, list(rows)] = well
     return rating
 
 
-def choose(offered: dict[str, Tensor], limit: int = MOST_MOMENTS) -> list[str]:
+def choose(offered: dict[str, Rating], limit: int = MOST_MOMENTS) -> list[str]:
     moments = Moments[str](limit)
     for name, rating in offered.items():
         moments.offer(rating, name)
@@ -41,7 +41,7 @@ def test_what_is_not_kept_is_released_at_once() -> None:
         frame = Frame()
         frames.append(weakref.ref(frame))
         # ever better, so that each is kept for a while
-        rating = torch.from_numpy(random.random((1, 1, SIDE, SIDE)) * (1 + number / 9)).float()
+        rating = random.random((1, SIDE, SIDE)) * (1 + number / 9)
         moments.offer(rating, frame)
         del frame
         held = sum(one() is not None for one in frames)
@@ -54,11 +54,11 @@ def test_the_moments_that_show_most_together_are_found(order: tuple[str, ...]) -
     """Among many that see everything badly, three see a third each as well as can be."""
     best = {"head": sees(0, 1), "trunk": sees(2, 3, 4), "legs": sees(5, 6, 7)}
     random = np.random.default_rng(1)
-    offered: dict[str, Tensor] = {}
+    offered: dict[str, Rating] = {}
     for name in order:
         for number in range(5):
-            blurred = 0.1 + 0.1 * random.random((1, 1, SIDE, SIDE))
-            offered[f"before the {name} {number}"] = torch.from_numpy(blurred).float()
+            blurred = 0.1 + 0.1 * random.random((1, SIDE, SIDE))
+            offered[f"before the {name} {number}"] = blurred
         offered[name] = best[name]
     assert choose(offered, limit=3) == list(order)
 
@@ -83,8 +83,8 @@ def test_several_become_superfluous_together_but_not_all() -> None:
 def test_little_more_is_not_worth_a_moment() -> None:
     everything = sees(*range(SIDE))
     for share, kept in ((LEAST_GAIN * 0.5, 1), (LEAST_GAIN * 3, 2)):
-        more = everything.clone()
-        more[0, 0, 0] += share * SIDE
+        more = everything.copy()
+        more[0, 0] += share * SIDE
         assert len(choose({"all": everything, "a little more": more - sees(*range(1, SIDE))})) == (
             kept
         )

@@ -11,7 +11,7 @@ import pytest
 from motion_transfer.drawing.outline import clearance_of, measure_clearance, stand_out
 from motion_transfer.drawing.person import disc
 from motion_transfer.media.pictures.photo import Photo
-from nhrr_core.parts import ALL_PARTS
+from nhrr_core import ALL_PARTS
 
 COAT = (60, 20, 20)
 
@@ -67,7 +67,7 @@ def photo(rgb: np.ndarray, alpha: np.ndarray | None = None) -> Photo:
 
 
 def known(clearance) -> np.ndarray:
-    return clearance[0, 0].numpy()[clearance[0, 1].numpy() > 0]
+    return clearance[0][clearance[1] > 0]
 
 
 @pytest.mark.parametrize("scale", [2, 4, 9])
@@ -86,7 +86,8 @@ def test_the_alpha_given_counts_before_the_photos(studio) -> None:
     iuv = studio.iuv(10, 6, scale=3, size=(330, 270))
     tight, wide = (grow(iuv[..., 0] > 0, reach) for reach in (1, 9))
     both = clearance_of(photo(studio.dress(iuv), tight), iuv, ALL_PARTS, alpha=wide)
-    assert both.equal(clearance_of(photo(studio.dress(iuv), wide), iuv, ALL_PARTS))
+    alone = clearance_of(photo(studio.dress(iuv), wide), iuv, ALL_PARTS)
+    np.testing.assert_array_equal(both, alone)
     assert np.median(known(both)) > 0.2
 
 
@@ -94,7 +95,7 @@ def test_only_the_parts_asked_for(studio) -> None:
     iuv = studio.iuv(10, 6, scale=3, size=(330, 270))
     shown = photo(studio.dress(iuv), grow(iuv[..., 0] > 0, 6))
     everything, head, torso = (
-        clearance_of(shown, iuv, parts)[0, 1] > 0 for parts in (ALL_PARTS, (23, 24), (2,))
+        clearance_of(shown, iuv, parts)[1] > 0 for parts in (ALL_PARTS, (23, 24), (2,))
     )
     assert head.any()
     assert torso.any()

@@ -21,7 +21,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import Photo
 from motion_transfer.render.options import Garment, SourceOptions, parse_parts
 from motion_transfer.render.source import read_source
-from nhrr_core import load_uv_layout
+from nhrr_core import load_uv_tables
 
 SIZE = 64
 TORSO, HEAD, SHINS = (2,), (23, 24), (13, 14)
@@ -35,11 +35,11 @@ def prepare(photo: Path, **changes) -> Source:
 def colour_of(source: Source, parts: tuple[int, ...]) -> list[int] | None:
     """The median colour of some parts in the texture; None where only their border is seen."""
     step = 256 // SIZE
-    texels = np.isin(load_uv_layout().part.numpy()[step // 2 :: step, step // 2 :: step], parts)
-    seen = texels & (source.visibility[0, 0].numpy() > 0)
+    texels = np.isin(load_uv_tables().part[step // 2 :: step, step // 2 :: step], parts)
+    seen = texels & (source.visibility[0] > 0)
     if seen.sum() < 0.3 * texels.sum():
         return None
-    colours = source.texture[0].permute(1, 2, 0).numpy()[seen]
+    colours = source.texture[:, seen].T
     return ((np.median(colours, axis=0) + 1) * 127.5).round().astype(int).tolist()
 
 
@@ -251,8 +251,8 @@ def test_a_garment_brings_its_own_clearance(studio) -> None:
 
     def width(source: Source, parts: tuple[int, ...]) -> float:
         assert source.clearance is not None
-        clearance, known = source.clearance[0].numpy()
-        texels = np.isin(load_uv_layout().part.numpy()[1::2, 1::2], parts) & (known > 0)
+        clearance, known = source.clearance
+        texels = np.isin(load_uv_tables().part[1::2, 1::2], parts) & (known > 0)
         return float(np.percentile(clearance[texels], 90))
 
     person, trousers = clear("person", 3), clear("trousers", 9)

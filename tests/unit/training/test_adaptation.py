@@ -14,6 +14,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from motion_transfer.drawing.source import SourcePicture, unfold_source
+from motion_transfer.drawing.textures import average
 from motion_transfer.errors import TrainingError
 from motion_transfer.events import Event, FramesDone, Notice, Stage
 from motion_transfer.media.pictures.photo import Photo
@@ -181,7 +182,7 @@ def test_a_plain_backdrop_tells_the_outline(take) -> None:
 def test_hidden_pixels_are_those_that_no_photo_shows(take, studio) -> None:
     pose = studio.iuv()
     photos = [take(parts=(2,)), take(parts=(23,))]
-    seen = F.adaptive_max_pool2d(unfold_source(photos, 256).visibility, 32)[0, 0] > 0
+    seen = average(unfold_source(photos, 256).visibility, 32)[0] > 0
     hidden, part = hidden_pixels(pose, seen), pose[..., 0]
     assert not hidden[part == 0].any()
     assert hidden[np.isin(part, (2, 23))].mean() < 0.2  # the outline is trimmed

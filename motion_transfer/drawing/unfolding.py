@@ -1,0 +1,229 @@
+"""A photo unfolded into UV space, for one picture and without torch, which takes a second to load.
+
+These are the twins of `extract_texture` and `unfold_clearance` in `nhrr_core`, which batches,
+gradients and GPUs need, and which are the specification: tests hold these to them. On a CPU these
+are two to three times as fast.
+
+Convention: images have their channels last, maps have them first, and neither has a batch axis;
+places are (x, y), along the first axis, in [0, 1] of the texture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64, Int64, Shaped, UInt8
+
+from nhrr_core import load_uv_tables
+from nhrr_core.config import CLEARANCE_SIZE, UNIT_TEXELS
+from nhrr_core.uv_tables import (
+    CHART_SIZE,
+    MAX_CHART_STEP,
+    MAX_ENTRY_STEP,
+    MAX_STRETCH,
+    SAMPLES_PER_TEXEL,
+)
+
+POINTS_AT_ONCE = 2**16
+"""So many fit into a core's cache with all that is computed of them."""
+
+CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a quad: down, right
+
+
+class Charts(NamedTuple):
+    """The tables' charts as they are looked up fastest.
+
+    Attributes:
+        x, y: Where each entry lies in the texture, in the order of part, V, U.
+        torn: Whether a seam of the texture runs between an entry and the next ones.
+    """
+
+    x: Float32[np.ndarray, " L"]
+    y: Float32[np.ndarray, " L"]
+    torn: Bool[np.ndarray, " L"]
+
+
+@cache
+def _charts() -> Charts:
+    axes = np.ascontiguousarray(np.moveaxis(load_uv_tables().charts, -1, 0))
+    torn = np.zeros(axes.shape[1:], bool)
+    torn[:, :-1, :-1] = (_spans(axes) > MAX_ENTRY_STEP).any(0)
+    x, y = axes.reshape(2, -1)
+    return Charts(x, y, torn.reshape(-1))
+
+
+def texture_coordinates(iuv: UInt8[np.ndarray, "... 3"]) -> Float32[np.ndarray, "2 ..."]:
+    """Look up where each pixel lies in the texture; undefined where I is 0."""
+    part, u, v = (iuv[..., channel].astype(np.int64) for channel in range(3))
+    entry = (np.maximum(part - 1, 0) * CHART_SIZE + v) * CHART_SIZE + u
+    charts = _charts()
+    return np.stack([charts.x.take(entry), charts.y.take(entry)])
+
+
+def texel_index(place: Float32[np.ndarray, "2 ..."], size: int) -> Int64[np.ndarray, "*shape"]:
+    """Tell the texel, row * size + column, that a place falls into."""
+    column, row = (np.minimum((axis * size).astype(np.int64), size - 1) for axis in place)
+    row *= size
+    row += column
+    return row
+
+
+def keep_parts(
+    iuv: UInt8[np.ndarray, "H W 3"], parts: tuple[int, ...]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Turn every pixel of another part into background, (0, 0, 0)."""
+    allowed = np.zeros(256, np.uint8)
+    allowed[list(parts)] = 1
+    return iuv * allowed[iuv[..., :1]]
+
+
+def extract_texture(
+    image: Float32[np.ndarray, "H W C"], iuv: UInt8[np.ndarray, "H W 3"], size: int
+) -> tuple[Float32[np.ndarray, "C T T"], Float32[np.ndarray, "1 T T"]]:
+    """Unfold the visible pixels of a photo, see `nhrr_core.extract_texture`.
+
+    Args:
+        size: T, side of the texture in texels.
+    Returns: The texture, 0 where unseen; and the visibility, 1 where seen and 0 elsewhere.
+    """
+    place, seen = texture_coordinates(iuv), iuv[..., 0] > 0
+    total, count = np.zeros((image.shape[-1], size**2)), np.zeros(size**2, np.int64)
+    _add(total, count, texel_index(place[:, seen], size), image[seen].T)
+    unhit = count == 0  # what is interpolated only fills where no pixel landed
+    for steps, row, column in _quads_by_steps(iuv, place, size):
+        found = list(_fill_points(image, iuv, row, column, steps, unhit, size))
+        texels, colours = (np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True))
+        _add(total, count, texels, colours)
+    texture = (total / np.maximum(count, 1)).astype(np.float32)
+    return texture.reshape(-1, size, size), (count > 0).astype(np.float32).reshape(1, size, size)
+
+
+def _add(
+    total: Float64[np.ndarray, "C L"],
+    count: Int64[np.ndarray, " L"],
+    index: Int64[np.ndarray, " N"],
+    values: Float32[np.ndarray, "C N"],
+) -> None:
+    """Add values to the sums, and 1 each to the counts, that they belong to."""
+    count += np.bincount(index, minlength=len(count))
+    for own, channel in zip(total, values, strict=True):
+        own += np.bincount(index, channel, minlength=len(count))
+
+
+def _spans(values: Shaped[np.ndarray, "*C H W"]) -> Shaped[np.ndarray, "*C h w"]:
+    """The range of values in each quad of four neighbours."""
+    across = [extreme(values[..., :-1], values[..., 1:]) for extreme in (np.maximum, np.minimum)]
+    highest, lowest = (
+        extreme(each[..., :-1, :], each[..., 1:, :])
+        for extreme, each in zip((np.maximum, np.minimum), across, strict=True)
+    )
+    return highest - lowest
+
+
+def _quads_by_steps(
+    iuv: UInt8[np.ndarray, "H W 3"], place: Float32[np.ndarray, "2 H W"], size: int
+) -> Iterator[tuple[int, Int64[np.ndarray, " Q"], Int64[np.ndarray, " Q"]]]:
+    """Quads to fill, as row and column of their first corner, by points along a side."""
+    part = iuv[..., 0]
+    joined = (part[:-1, :-1] > 0) & (_spans(part) == 0)
+    for channel in (1, 2):
+        joined &= _spans(iuv[..., channel]) <= MAX_CHART_STEP * 255
+    stretch = _spans(place).max(0)
+    joined &= stretch <= MAX_STRETCH
+    wanted = stretch * size * SAMPLES_PER_TEXEL
+    low, steps = SAMPLES_PER_TEXEL, 4  # under one texel apart: none lies between
+    while low < MAX_STRETCH * size * SAMPLES_PER_TEXEL:
+        row, column = (joined & (wanted > low) & (wanted <= steps)).nonzero()
+        if len(row):
+            yield steps, row, column
+        low, steps = steps, steps * 2
+
+
+def _fill_points(
+    image: Float32[np.ndarray, "H W C"],
+    iuv: UInt8[np.ndarray, "H W 3"],
+    row: Int64[np.ndarray, " Q"],
+    column: Int64[np.ndarray, " Q"],
+    steps: int,
+    unhit: Bool[np.ndarray, " L"],
+    size: int,
+) -> Iterator[tuple[Int64[np.ndarray, " N"], Float32[np.ndarray, "C N"]]]:
+    """Texels and colours of steps x steps points spread evenly inside each quad.
+
+    Those in texels that are hit, about half of them, are left out.
+    """
+    line = ((np.arange(steps) + 0.5) / steps).astype(np.float32)
+    down, right = (axis.reshape(-1) for axis in np.meshgrid(line, line, indexing="ij"))
+    weights = np.stack([a * b for a in (1 - down, down) for b in (1 - right, right)])
+    at_once = max(1, POINTS_AT_ONCE // steps**2)
+    for first in range(0, len(row), at_once):
+        some = slice(first, first + at_once)
+        corners = [(row[some] + below, column[some] + beside) for below, beside in CORNERS]
+        part, u, v = (
+            np.stack([iuv[corner] for corner in corners], -1).astype(np.float32).swapaxes(0, 1)
+        )
+        # multiples of a power of two, hence exact
+        place = _place_between_entries(part[:, :1], u @ weights, v @ weights)
+        texel = texel_index(place, size).reshape(-1)
+        kept = unhit.take(texel).nonzero()[0]
+        colours = np.stack([image[corner] for corner in corners], -1).swapaxes(0, 1)  # C x Q x 4
+        yield texel.take(kept), np.stack([(each @ weights).take(kept) for each in colours])
+
+
+def _place_between_entries(
+    part: Float32[np.ndarray, "Q 1"],
+    u: Float32[np.ndarray, "Q P"],
+    v: Float32[np.ndarray, "Q P"],
+) -> Float32[np.ndarray, "2 Q P"]:
+    """Texture coordinates of fractional U and V: bilinear, and the nearest entry's across a seam.
+
+    Entries are counted in float32, which holds their number exactly.
+    """
+    charts, chart = _charts(), (part - 1) * CHART_SIZE**2
+    left, top = (np.minimum(np.floor(axis), CHART_SIZE - 2) for axis in (u, v))
+    first = (chart + top * CHART_SIZE + left).astype(np.int64)
+    right, down = u - left, v - top
+    seam = charts.torn.take(first).nonzero()
+    nearest = np.rint(v[seam]) * CHART_SIZE + np.rint(u[seam]) + chart[seam[0], 0]
+    place = np.empty((2, *u.shape), np.float32)
+    for number, axis in enumerate((charts.x, charts.y)):
+        # entries further on are looked up from a later beginning
+        a, b, c, d = (axis[y * CHART_SIZE + x :].take(first) for y, x in CORNERS)
+        _move(a, b, right)
+        _move(c, d, right)
+        place[number] = _move(a, c, down)
+        place[number][seam] = axis[nearest.astype(np.int64)]
+    return place
+
+
+def _move(
+    start: Float32[np.ndarray, "Q P"],
+    end: Float32[np.ndarray, "Q P"],
+    share: Float32[np.ndarray, "Q P"],
+) -> Float32[np.ndarray, "Q P"]:
+    """Move from start to end by a share, in place: new memory would take most of the time."""
+    end -= start
+    end *= share
+    start += end
+    return start
+
+
+def unfold_clearance(
+    clearance: Float32[np.ndarray, "H W"],
+    measured: Bool[np.ndarray, "H W"],
+    iuv: UInt8[np.ndarray, "H W 3"],
+) -> Float32[np.ndarray, "2 128 128"]:
+    """Unfold a photo's clearance onto the body's surface, see `nhrr_core.unfold_clearance`."""
+    in_units = clearance / np.float32(pixels_per_texel(iuv) * UNIT_TEXELS)
+    own = iuv * measured[..., None]
+    return np.concatenate(extract_texture(in_units[..., None], own, CLEARANCE_SIZE))
+
+
+def pixels_per_texel(iuv: UInt8[np.ndarray, "H W 3"]) -> float:
+    """Measure how large a body is in its image: the side of a texel of CLEARANCE_SIZE, px."""
+    body = iuv[iuv[..., 0] > 0]
+    texels = np.unique(texel_index(texture_coordinates(body), CLEARANCE_SIZE))
+    return (len(body) / len(texels)) ** 0.5 if len(body) else 1.0
