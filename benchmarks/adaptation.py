@@ -21,11 +21,11 @@ import numpy as np
 import torch
 
 from motion_transfer.drawing.canvas import Canvas, make_background
+from motion_transfer.drawing.engines import Execution
+from motion_transfer.drawing.engines.torch_engine import TorchEngine
 from motion_transfer.drawing.person import bounding_box
 from motion_transfer.drawing.renderers.network import (
     NeuralRenderer,
-    PreparedNetwork,
-    encode_source,
 )
 from motion_transfer.drawing.source import SourcePicture, read_person, unfold_source
 from motion_transfer.drawing.window import plan_window
@@ -117,7 +117,8 @@ def score(
 ) -> np.ndarray:
     """Mean distances over the targets, by COLUMNS; NaN where no target has such a region."""
     source = unfold_source(sources, model.config.finest_texture)
-    renderer = NeuralRenderer(PreparedNetwork(model, compile=False), encode_source(model, source))
+    engine = TorchEngine(model, Execution("torch", "f32", "cpu"))
+    renderer = NeuralRenderer(engine, engine.encode(source))
     framing, network = Framing(), open_efficientnet()
     found = []
     for target in targets:

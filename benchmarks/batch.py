@@ -132,7 +132,7 @@ def manifest(folder: Path, sizes: Sizes) -> None:
 
 def shared(folder: Path, sizes: Sizes) -> None:
     weights = str(weights_of(folder, sizes.preset))
-    network = {"renderer": "nhrr", "weights": weights, "compile": False, "frames": "0"}
+    network = {"renderer": "nhrr", "weights": weights, "frames": "0"}
     driver = driver_folder(folder, 8)
     told = run_manifest(write_manifest(folder, "shared", driver, 20, suffix=".json", **network))
     print(f"shared: {told['done']} jobs of one source, {told['maps']} feature map", flush=True)
@@ -142,7 +142,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
     import numpy as np
     import torch
 
-    from motion_transfer.drawing.renderers.network import one_torch_thread
+    from motion_transfer.drawing.engines.threads import one_torch_thread
     from motion_transfer.events import ignore
     from motion_transfer.media.work import WorkFolder
     from motion_transfer.render.engine import Engine
@@ -155,7 +155,6 @@ def overhead(folder: Path, sizes: Sizes) -> None:
         output=folder / "overhead.mp4",
         renderer="nhrr",
         weights=weights_of(folder, sizes.preset),
-        compile=not sizes.quick,
     )
     with WorkFolder(options.output) as work:
         composed = prepare(options, work, ignore)
@@ -203,7 +202,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
 def workers(folder: Path, sizes: Sizes) -> None:
     cores = len(os.sched_getaffinity(0))
     weights = str(weights_of(folder, sizes.preset))
-    network = {"renderer": "nhrr", "weights": weights, "compile": not sizes.quick}
+    network = {"renderer": "nhrr", "weights": weights}
     counts = [count for count in (1, 2, 4, 8, 16, 32) if count <= cores]
     driver = driver_folder(folder, sizes.frames)
     rates: dict[int, list[float]] = {count: [] for count in counts}
@@ -256,7 +255,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=96)
     parser.add_argument("--preset", default="lite")
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--quick", action="store_true", help="once, little, and not compiled")
+    parser.add_argument("--quick", action="store_true", help="once, and little")
     parser.add_argument("--only", choices=tuple(PARTS))
     given = parser.parse_args()
     frames, rounds = (8, 1) if given.quick else (given.frames, given.rounds)

@@ -23,7 +23,7 @@ def peak_mib(driver: Path, output: Path, weights: Path | None) -> float:
     from motion_transfer import render_video
 
     renderer = "nhrr" if weights else "texture"
-    render_video(SOURCE, driver, output, renderer=renderer, weights=weights, compile=False)
+    render_video(SOURCE, driver, output, renderer=renderer, weights=weights)
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 

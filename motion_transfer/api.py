@@ -40,7 +40,9 @@ def render_video(
     background: str = "white",
     workers: int | None = None,
     adapt: bool = False,
-    compile: bool | None = None,
+    engine: str | None = None,
+    precision: str | None = None,
+    device: str | None = None,
     frame_rate: str | float | Fraction | None = None,
     codec: str | None = None,
     crf: int | None = None,
@@ -82,7 +84,9 @@ def render_video(
         workers: Threads; else one for each core.
         adapt: Let the network learn the source's person first, some minutes; later runs find it
             done.
-        compile: Whether to compile the network; else where it pays.
+        engine: What runs the network, `openvino`, `torch` or `onnx`; else the fastest here.
+        precision: What it is computed in, `int8`, `bf16` or `f32`; else the fastest here.
+        device: `cpu`, `cuda`, or `cuda:1`; else `cuda` where it is.
         frame_rate: Frames per second, exact if given as a string or Fraction.
         codec, crf: Of a video; else by container and codec.
         audio: File whose sound is laid under, or `"none"`; else the driver's own, if it has any.
@@ -121,7 +125,9 @@ def render_video(
             background=background,
             workers=workers,
             adapt=adapt,
-            compile=compile,
+            engine=engine,
+            precision=precision,
+            device=device,
             output=Path(output),
             frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
             codec=codec,

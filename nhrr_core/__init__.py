@@ -14,7 +14,6 @@ from nhrr_core.parts import ALL_PARTS, PART_COUNT, PART_GROUPS, PART_NAMES
 if TYPE_CHECKING:
     from nhrr_core.clearance import unfold_clearance
     from nhrr_core.discriminator import Discriminator, Verdict
-    from nhrr_core.fast_render_net import FastRenderNet
     from nhrr_core.feature_net import FeatureNet
     from nhrr_core.iuv import check_iuv, keep_parts, normalise_iuv
     from nhrr_core.losses import (
@@ -52,7 +51,6 @@ __all__ = [
     "VARIANTS",
     "ConfigError",
     "Discriminator",
-    "FastRenderNet",
     "FeatureNet",
     "IuvError",
     "LossWeights",
@@ -92,7 +90,6 @@ __all__ = [
 _LATE = {
     "clearance": ["unfold_clearance"],
     "discriminator": ["Discriminator", "Verdict"],
-    "fast_render_net": ["FastRenderNet"],
     "feature_net": ["FeatureNet"],
     "iuv": ["check_iuv", "keep_parts", "normalise_iuv"],
     "losses": [

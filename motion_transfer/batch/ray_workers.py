@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any
 
 from motion_transfer.batch.tasks import Fetch
+from motion_transfer.cores import take_share
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
 
@@ -103,12 +104,7 @@ class Worker:
 
     def __init__(self) -> None:
         os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as every command has it
-        import cv2
-        import torch
-
-        if not torch.cuda.is_available():
-            torch.set_num_threads(1)
-        cv2.setNumThreads(1)
+        take_share(1)
 
     def call(self, task: Callable[..., Any], *arguments: Any) -> Any:
         """Run a task here; it finds what this process keeps warm."""

@@ -192,8 +192,7 @@ def render(
     Returns: Index and digest of each segment.
     Raises: InputError for a driver that is damaged or changed; RenderError; OutputError.
     """
-    import torch
-
+    from motion_transfer.cores import core_count
     from motion_transfer.media.publish import explain_disk_errors
     from motion_transfer.media.work import publish_piece
     from motion_transfer.render.engine import ContactSheet, Engine
@@ -218,7 +217,7 @@ def render(
     )
     with explain_disk_errors(folder):
         wanted = [(run.plan.chunks[index], path) for index, path, _ in chunks]
-        engine.render(wanted, torch.get_num_threads(), finish)
+        engine.render(wanted, core_count(), finish)
     return digests
 
 

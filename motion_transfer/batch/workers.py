@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from motion_transfer.batch.tasks import Fetch
+from motion_transfer.cores import core_count, take_share
+from motion_transfer.drawing.engines import has_cuda
 
 ORPHANED = 3  # exit code of a worker whose scheduler is gone
 
@@ -108,14 +110,11 @@ def begin_worker(place: int, count: int, path: list[str]) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # whatever the command's own handler does
     threading.Thread(target=_follow_parent, daemon=True).start()
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-    import cv2
-    import torch
+    take_share(max(1, core_count() // count))
+    if has_cuda():
+        import torch
 
-    if torch.cuda.is_available():
         torch.cuda.set_device(place % torch.cuda.device_count())
-    threads = max(1, len(os.sched_getaffinity(0)) // count)
-    torch.set_num_threads(threads)
-    cv2.setNumThreads(threads)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from motion_transfer.drawing.canvas import Canvas, make_background
+from motion_transfer.drawing.engines import ANYTHING, Wish
 from motion_transfer.drawing.person import bounding_box
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
 from motion_transfer.drawing.source import Source, SourcePicture, unfold_source
@@ -80,14 +81,16 @@ class RenderedCandidate:
     Args:
         weights: Of the renderer; None: its default ones, or none.
         background: Behind the person, as `mt run` takes it.
+        wish: How its network is to be run, where it has one.
     Raises: InputError for weights that cannot be used.
     """
 
-    def __init__(self, renderer: str, weights: Path | None, background: str) -> None:
-        recipe = RENDERERS[renderer].recipe(weights)
-        # loaded now: what is wrong with a checkpoint is said before any pair is drawn; not
-        # compiled, as that may change the last bits of a picture
-        self._recipe = recipe.made_ready(False, 0, (), lambda _words: None)
+    def __init__(
+        self, renderer: str, weights: Path | None, background: str, wish: Wish = ANYTHING
+    ) -> None:
+        recipe = RENDERERS[renderer].recipe(weights, wish)
+        recipe.make_ready(())  # now: what is wrong with a checkpoint is said before pairs are drawn
+        self._recipe = recipe
         self._background = background
         self._kind, self.label = ("weights", weights.stem) if weights else ("renderer", renderer)
         self.takes_turns = recipe.occupies != "nothing"
@@ -189,9 +192,12 @@ def open_candidates(
 
     Raises: InputError for weights that cannot be used, or if something is given twice.
     """
-    weights = [find_weights(path) for path in options.weights]
+    weights, wish = (
+        [find_weights(path) for path in options.weights],
+        Wish(precision=options.precision),
+    )
     candidates: list[Candidate] = [
-        *(RenderedCandidate(DEFAULT_RENDERER, path, options.background) for path in weights),
+        *(RenderedCandidate(DEFAULT_RENDERER, path, options.background, wish) for path in weights),
         *folders,
     ]
     make_labels_unique(candidates, [*weights, *options.results])

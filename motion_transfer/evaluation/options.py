@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motion_transfer.drawing.engines import PRECISIONS
 from motion_transfer.drawing.renderers import DRAFT, RENDERERS
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.formats import CHANNEL_ORDERS, ChannelOrder
@@ -93,6 +94,13 @@ class EvaluationOptions:
     )
     renderer: str | None = option(
         "--renderer", METHODS, "The renderer without a network as well.", metavar=DRAFT
+    )
+    precision: str | None = option(
+        "--precision",
+        METHODS,
+        "Numbers that networks are computed in: int8, bf16 or f32; default: as mt run does.",
+        choices=PRECISIONS,
+        metavar="NAME",
     )
     results: tuple[Path, ...] = option(
         "--results",

@@ -82,8 +82,8 @@ class Views:
     def texture(self, options: RenderOptions) -> Frame:
         """Show the partial texture; grey where nothing is seen."""
         source = self.source(options)
-        colours = ((source.texture[0] + 1) * 127.5).round().byte().permute(1, 2, 0).numpy()
-        seen = source.visibility[0, 0].numpy()[..., None] > 0
+        colours = ((source.texture + 1) * 127.5).round().astype(np.uint8).transpose(1, 2, 0)
+        seen = source.visibility[0][..., None] > 0
         return np.where(seen, colours, np.uint8(128))  # neither light nor dark
 
     def feature_map(self, options: RenderOptions) -> Frame:
@@ -115,8 +115,7 @@ class Views:
         return appearance[0, : renderer.feature_channels], renderer
 
     def _recipe(self, options: RenderOptions) -> Recipe:
-        # a single frame is wanted soon, so nothing is compiled
-        return self._open_recipe(part_of(replace(options, compile=False), RendererOptions))
+        return self._open_recipe(part_of(options, RendererOptions))
 
     def _prepare_source(
         self, recipe: Recipe, options: SourceOptions

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import sys
 from collections import Counter
@@ -13,10 +12,11 @@ import numpy as np
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
+from motion_transfer.cores import core_count
+from motion_transfer.drawing.engines import ANYTHING, ENGINES, choose_execution
 from motion_transfer.drawing.kept_source import inspect_source
 from motion_transfer.drawing.person import find_people
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
-from motion_transfer.drawing.renderers.network import choose_dtype
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.iuv.network import SHIPPED as IUV_NETWORK
 from motion_transfer.estimate.iuv.network import has_shipped
@@ -36,7 +36,7 @@ from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.render.options import is_kept
 from motion_transfer.version import __version__, package_version
-from motion_transfer.weights import SHIPPED, find_weights
+from motion_transfer.weights import DEFAULT_WEIGHTS, SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import inspect_checkpoint
 from nhrr_core import PART_GROUPS, PART_NAMES, PRESETS, ModelConfig, NeuralReRenderer
 
@@ -44,7 +44,7 @@ ORDER_WORDS = {
     "iuv": "iuv (file RGB = I, U, V)",
     "vui": "vui (file RGB = V, U, I, as Caffe2's DensePose writes)",
 }
-PACKAGES = ("torch", "numpy", "opencv-contrib-python-headless", "av", "safetensors")
+PACKAGES = ("torch", "openvino", "numpy", "opencv-contrib-python-headless", "av", "safetensors")
 Facts = dict[str, Any]
 
 
@@ -60,16 +60,19 @@ def describe_parts() -> Facts:
 
 def describe_setup() -> Facts:
     """Tell versions, device, renderers, and what a frame of each preset costs."""
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    name = torch.cuda.get_device_name() if device.type == "cuda" else platform.processor() or "CPU"
-    cores = len(os.sched_getaffinity(0))
+    on_cuda = torch.cuda.is_available()
+    name = torch.cuda.get_device_name() if on_cuda else platform.processor() or "CPU"
+    how = choose_execution(ANYTHING, inspect_checkpoint(find_weights(DEFAULT_WEIGHTS)))
     return {
         "motion-transfer": __version__,
         "python": sys.version.split()[0],
         **{package: package_version(package) for package in PACKAGES},
-        "device": f"{device.type} ({name}, {cores} cores), nhrr in {choose_dtype(device)}".replace(
-            "torch.", ""
-        ),
+        "device": f"{name}, {core_count()} cores",
+        "nhrr runs on": str(how),
+        "engines": {
+            row.name: row.summary if row.installed else f"pip install {row.package}"
+            for row in ENGINES.values()
+        },
         "renderers": {
             name: row.summary + " (default)" * (name == DEFAULT_RENDERER)
             for name, row in RENDERERS.items()

@@ -116,11 +116,11 @@ def read_format(options: OutputOptions) -> OutputFormat:
 
 
 def open_recipe(options: RendererOptions) -> Recipe:
-    """Make the recipe of the renderer that the options name, not compiled.
+    """Make the recipe of the renderer that the options name.
 
-    Raises: InputError for weights that cannot be read.
+    Raises: InputError for weights that cannot be read, or not be run as the options say.
     """
-    return RENDERERS[options.renderer].recipe(options.weights)
+    return RENDERERS[options.renderer].recipe(options.weights, options.wish)
 
 
 def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
@@ -149,7 +149,7 @@ def prepare_run(
     inputs: Inputs,
     listener: Listener,
 ) -> Prepared:
-    """Put the parts together; the network is loaded, and compiled if it is to be.
+    """Put the parts together; the network is loaded.
 
     Args:
         inputs: What recipe and source were read from.
@@ -159,12 +159,7 @@ def prepare_run(
     inputs |= scan.inputs | Inputs(audio_files(options))
     output_format = read_format(options)
     _check_length(options, output_format, plan)
-    recipe = recipe.made_ready(
-        options.compile,
-        len(plan.frames),
-        [shot.window.side for shot in plan.shots],
-        lambda words: listener(Notice(words)),
-    )
+    recipe.make_ready([shot.window.side for shot in plan.shots])
     key = run_key(
         options,
         recipe=recipe,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,13 +25,18 @@ if TYPE_CHECKING:
     from motion_transfer.drawing.renderers.interface import Recipe
     from motion_transfer.media.output.formats import OutputFormat
 
-LIBRARIES = ("torch", "numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy")
+LIBRARIES = (
+    *("torch", "openvino", "onnxruntime"),
+    *("numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy"),
+)
+CPU_FACTS = Path("/proc/cpuinfo")
+VECTOR_UNITS = re.compile(r"\b(?:avx|amx|asimd|sve)\w*")
 KEYED_ELSEWHERE = {
     *("source", "source_iuv", "garments", "weights", "adapt"),  # by the files' content
     *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
     *("frames", "frame_rate"),  # by the plan
     *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
-    *("renderer", "compile", "codec", "crf"),  # by the recipe and the format
+    *("renderer", "engine", "precision", "device", "codec", "crf"),  # by the recipe and the format
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio", "audio_track"),  # made when everything is drawn
 }
@@ -45,7 +51,7 @@ def source_key(options: SourceOptions, recipe: Recipe) -> str:
             "parts": [garment.parts for garment in options.garments],
             "person": options.person,
             "order": options.source_iuv_order,
-            "renderer": [recipe.name, recipe.content],
+            "renderer": [recipe.name, recipe.content, recipe.execution],
         }
     )
 
@@ -93,11 +99,11 @@ def run_key(
             "options": drawn,
             "in place": in_place,
             "thumbnails": options.sheet is not None,
-            "renderer": [recipe.name, recipe.content, recipe.compiled],
+            "renderer": [recipe.name, recipe.content, recipe.execution],
             "format": [asdict(output_format), options.output.suffix.lower()],
             "shots": [asdict(shot) for shot in plan.shots],
             "rate": plan.frame_rate,
-            "device": _device(),
+            "device": _device(recipe.device),
             "versions": [__version__, *(package_version(name) for name in LIBRARIES)],
         }
     )
@@ -141,10 +147,11 @@ def _estimator_facts(options: EstimatorOptions) -> dict[str, Any]:
     return estimator_facts(options.estimator, options.estimator_model)
 
 
-def _device() -> list[str]:
-    """Name what computes: another instruction set may round otherwise."""
-    import torch
+def _device(name: str) -> list[str]:
+    """Tell what computes: another instruction set may round otherwise."""
+    if name.startswith("cuda"):
+        import torch
 
-    if torch.cuda.is_available():
-        return [torch.cuda.get_device_name()]
-    return [platform.machine(), torch.backends.cpu.get_cpu_capability()]
+        return [torch.cuda.get_device_name(name)]
+    flags = CPU_FACTS.read_text() if CPU_FACTS.exists() else platform.processor()
+    return [platform.machine(), *sorted(set(VECTOR_UNITS.findall(flags)))]

@@ -20,8 +20,8 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.drawing.canvas import Frame
+from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.renderers.interface import Renderer
-from motion_transfer.drawing.renderers.network import one_torch_thread
 from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError, RenderError
 from motion_transfer.events import FramesDone, Listener, ignore

@@ -13,6 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
 
+from motion_transfer.drawing.engines import ANYTHING, ENGINES, PRECISIONS, Wish, check_device
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS, RendererRow
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.opening import ESTIMATORS, check_estimator
@@ -331,11 +332,22 @@ class RendererOptions(_Part):
         kind="flag",
         default=False,
     )
-    compile: bool | None = option(
-        "--compile/--no-compile",
+    engine: str | None = option(
+        "--engine",
         "Rendering",
-        "Compile the network first; default: for drivers of 300 frames and more.",
-        kind="switch",
+        "What runs the network: openvino (CPUs), torch (CUDA) or onnx; default: the fastest here.",
+        choices=tuple(ENGINES),
+        metavar="NAME",
+    )
+    precision: str | None = option(
+        "--precision",
+        "Rendering",
+        "Numbers it is computed in: int8, bf16 or f32; default: the fastest here that looks alike.",
+        choices=PRECISIONS,
+        metavar="NAME",
+    )
+    device: str | None = option(
+        "--device", "Rendering", "cpu, cuda, or cuda:1; default: cuda where it is.", metavar="NAME"
     )
 
     def __post_init__(self) -> None:
@@ -344,6 +356,18 @@ class RendererOptions(_Part):
             raise InputError(f"the {self.renderer} renderer uses no weights; leave out --weights")
         if self.adapt and RENDERERS[self.renderer].default_weights is None:
             raise InputError(f"the {self.renderer} renderer learns nothing; leave out --adapt")
+        if self.wish != ANYTHING and RENDERERS[self.renderer].default_weights is None:
+            raise InputError(
+                f"the {self.renderer} renderer runs no network; leave out --engine, --precision and"
+                " --device"
+            )
+        if self.device is not None:
+            check_device(self.device)
+
+    @property
+    def wish(self) -> Wish:
+        """How the network is to be run."""
+        return Wish(self.engine, self.precision, self.device)
 
     @property
     def weights_files(self) -> list[Path]:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import torch
 from torch import nn
 
-from motion_transfer.drawing.renderers.network import choose_dtype
+from motion_transfer.drawing.engines.torch_engine import choose_dtype
 from motion_transfer.training.config import Precision
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 FORMAT = "nhrr-1"
 RESERVED = ("format", "config")
+LENGTH_BYTES = 8  # of the number that a safetensors file begins with
+RANGES = "ranges"
+"""The note that holds, as JSON, what `read_ranges` reads."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,46 @@ def inspect_checkpoint(path: Path) -> CheckpointInfo:
     notes = {key: metadata[key] for key in sorted(metadata) if key not in RESERVED}
     count = sum(math.prod(entry.shape) for entry in state.values())
     return CheckpointInfo(path, _read_config(path, metadata), notes, len(state), count)
+
+
+def copy_with_notes(path: Path, copy: Path, notes: Mapping[str, str]) -> None:
+    """Write a copy of a checkpoint, its tensors as they are, with more notes.
+
+    Raises: WeightsError if it cannot be read.
+    """
+    metadata = {**read_header(path, "weights").metadata, **notes}
+    stored = path.read_bytes()
+    end = LENGTH_BYTES + int.from_bytes(stored[:LENGTH_BYTES], "little")
+    entries = json.loads(stored[LENGTH_BYTES:end])
+    header = json.dumps({**entries, "__metadata__": metadata}).encode()
+    header += b" " * (-len(header) % LENGTH_BYTES)  # the tensors begin at a multiple of it
+    copy.write_bytes(len(header).to_bytes(LENGTH_BYTES, "little") + header + stored[end:])
+
+
+def read_ranges(info: CheckpointInfo) -> dict[str, tuple[float, float]] | None:
+    """Tell the least and the largest value that each of RenderNet's convolutions reads.
+
+    They are what arithmetic of 8 bits needs to know, measured on pictures; see `RANGES`.
+
+    Returns: By the names of the convolutions; None where the checkpoint does not say.
+    Raises: WeightsError if what it says cannot be.
+    """
+    if RANGES not in info.notes:
+        return None
+    try:
+        values = parse_json(info.notes[RANGES], RANGES)
+        ranges = {str(name): (float(least), float(most)) for name, (least, most) in values.items()}
+    except (InputError, AttributeError, TypeError, ValueError):
+        ranges = {}
+    convolutions = {name.removesuffix(".weight") for name in list_tensors(info.config)}
+    if not ranges or any(
+        name not in convolutions or not -math.inf < least <= most < math.inf
+        for name, (least, most) in ranges.items()
+    ):
+        raise WeightsError(
+            f"weights {info.path} carry broken ranges of their numbers; measure them again"
+        )
+    return ranges
 
 
 def _read_config(path: Path, metadata: dict[str, str]) -> ModelConfig:

@@ -295,7 +295,7 @@ def test_a_second_ctrl_c_stops_at_once(studio, shoot: Path) -> None:
 
 def test_the_network_draws_the_same_with_any_number_of_workers(studio, shoot, checkpoint) -> None:
     network = [
-        *("--set", "renderer=nhrr", "--set", f"weights={checkpoint}", "--set", "compile=false"),
+        *("--set", "renderer=nhrr", "--set", f"weights={checkpoint}"),
         *("--jobs", ":2"),
     ]
     drawn = []

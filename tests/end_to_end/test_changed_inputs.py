@@ -16,6 +16,7 @@ import safetensors.torch
 from estimate_stubs import RED, scene, write_red_model
 
 from motion_transfer import render_video
+from motion_transfer.drawing.engines import ANYTHING
 from motion_transfer.drawing.person import Box
 from motion_transfer.drawing.renderers import network
 from motion_transfer.drawing.renderers.texture import TextureRecipe
@@ -213,10 +214,10 @@ def test_weights_that_changed_before_they_are_loaded_draw_nothing(
     """A batch's worker may load them long after the run was planned."""
     weights = tmp_path / "a.safetensors"
     shutil.copy(checkpoint, weights)
-    recipe = network.open_recipe(weights)
+    recipe = network.open_recipe(weights, ANYTHING)
     other_weights(checkpoint, weights)
     with pytest.raises(InputError, match=r"a.safetensors have changed since the run began"):
-        recipe.made_ready(False, 1, [64], print)
+        recipe.make_ready([64])
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")

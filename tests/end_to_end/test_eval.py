@@ -91,7 +91,7 @@ def test_a_candidate_is_what_mt_run_draws(studio, mt, pairs: Path, checkpoint: P
         picture = studio.folder / f"{method}.png"
         result = mt(
             *("run", "--source", studio.folder / "a.png", "--driver", studio.folder / "c_IUV.png"),
-            *("-o", picture, "--no-compile", *extra),
+            *("-o", picture, *extra),
         )
         assert result.code == 0, result.err
         np.testing.assert_array_equal(pixels(out / f"images/{method}/a__c.png"), pixels(picture))

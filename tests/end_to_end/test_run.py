@@ -253,7 +253,6 @@ def test_the_network_renders(studio, mt, checkpoint: Path) -> None:
     source, driver, output = studio.source(), studio.driver(6), studio.folder / "out"
     result = mt(
         *("run", "--source", source, "--driver", driver, "-o", output, "--weights", checkpoint),
-        "--no-compile",
     )
     assert result.code == 0
     assert "(nhrr renderer" in result.out

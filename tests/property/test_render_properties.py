@@ -56,7 +56,6 @@ def test_bytes_do_not_depend_on_workers(
             workers=workers,
             renderer=renderer,
             weights=checkpoint if renderer == "nhrr" else None,
-            compile=False,
         )
         results.append(content(path))
     assert len(results[0]) == (FRAMES if output == "out" else 1)

@@ -10,6 +10,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
+from motion_transfer.drawing.engines import ANYTHING, Wish
 from motion_transfer.weights import DEFAULT_WEIGHTS, find_weights
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ class RendererRow:
         name: What options and reports call it.
         summary: What it is, for help and `mt info`.
         report: What a person reads of it when a run is done.
-        opener: `module:function`, which makes its recipe of a weights file, or of nothing where it
-            uses none.
+        opener: `module:function`, which makes its recipe of a weights file and a `Wish`, or of
+            nothing where it uses none.
         default_weights: Weights that are taken if none are named; None: it uses none.
     """
 
@@ -46,9 +47,15 @@ class RendererRow:
             return []
         return [find_weights(weights or self.default_weights)]
 
-    def recipe(self, weights: Path | None) -> Recipe:
-        """Make its recipe. Raises: InputError for weights that cannot be read."""
-        return resolve_name(self.opener)(*self.files(weights))
+    def recipe(self, weights: Path | None, wish: Wish = ANYTHING) -> Recipe:
+        """Make its recipe.
+
+        Args:
+            wish: How its network is to be run, where it has one.
+        Raises: InputError for weights that cannot be read, or not be run as wished.
+        """
+        files = self.files(weights)
+        return resolve_name(self.opener)(*files, *([wish] if files else []))
 
 
 RENDERERS: dict[str, RendererRow] = {}

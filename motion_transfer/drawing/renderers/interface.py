@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from typing import Any, Literal, Protocol
+from collections.abc import Collection
+from typing import Any, Protocol
 
 import numpy as np
 from jaxtyping import Float, Shaped, UInt8
 
+from motion_transfer.drawing.engines.interface import Occupied
 from motion_transfer.drawing.source import Source
 
 Appearance = Shaped[np.ndarray, "..."]
 """What a renderer knows of a source: the network's feature map, or the table of its texture."""
-
-Occupied = Literal["core", "device", "nothing"]
-"""What a call keeps busy for long: a `core`, so that there are threads for calls alone, one for
-each worker; the `device`, so that one thread makes them; or `nothing`, and whoever wants a picture
-draws it."""
 
 
 class Renderer(Protocol):
@@ -53,7 +49,8 @@ class Recipe(Protocol):
     Attributes:
         name: The renderer's.
         content: What decides the appearance of a source, besides the source.
-        compiled: Whether it is compiled, which may change the last bits of a picture.
+        execution: How it is computed, which may change the last bits of a picture.
+        device: Where, `cpu`, `cuda` or `cuda:1`.
         texture_size: Side, texels, of the partial texture that `appearance_of` wants.
         occupies: What a call of the renderer will keep busy.
     """
@@ -63,7 +60,9 @@ class Recipe(Protocol):
     @property
     def content(self) -> str: ...
     @property
-    def compiled(self) -> bool: ...
+    def execution(self) -> str: ...
+    @property
+    def device(self) -> str: ...
     @property
     def texture_size(self) -> int: ...
     @property
@@ -77,22 +76,8 @@ class Recipe(Protocol):
         """Tell the side of the crops that the renderer will want, px. Raises: WeightsError."""
         ...
 
-    def made_ready(
-        self,
-        wish: bool | None,
-        frame_count: int,
-        window_sides: Collection[int],
-        say: Callable[[str], object],
-    ) -> Recipe:
-        """Load what draws and, if it is to be, compile it; give the recipe that says so.
-
-        Args:
-            wish: Whether to compile; None: where it pays.
-            frame_count: How many frames will be drawn.
-            window_sides: Of the windows in the driver, px, which it is compiled for.
-            say: Told what takes long.
-        Raises: WeightsError; InputError if compiling is asked for and cannot be had.
-        """
+    def make_ready(self, window_sides: Collection[int]) -> None:
+        """Load what draws, for windows of those sides in the driver, px. Raises: WeightsError."""
         ...
 
     def appearance_of(self, source: Source) -> Appearance:

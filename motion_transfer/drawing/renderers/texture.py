@@ -6,21 +6,20 @@ the other face of the same limb. What is left takes the colours around it on the
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
-import torch
-import torch.nn.functional as F
-from jaxtyping import Float, UInt8
-from scipy.spatial import KDTree
-from torch import Tensor
+import scipy  # its parts are imported when they are used, which nothing else here waits for
+from jaxtyping import Float, Float32, UInt8
 
-from motion_transfer.drawing.renderers.interface import Appearance, Occupied
+from motion_transfer.drawing.engines.interface import Occupied
+from motion_transfer.drawing.renderers.interface import Appearance
 from motion_transfer.drawing.source import Source
-from nhrr_core import PART_GROUPS, UVLayout, load_uv_layout, mirror_texture, sample_features
-from nhrr_core.parts import PART_COUNT
+from motion_transfer.drawing.textures import mirror_texture
+from nhrr_core import PART_COUNT, PART_GROUPS, load_uv_tables
 from nhrr_core.uv_tables import CHART_SIZE, TWIN_SIZE
 
 TEXTURE_SIZE = 256
@@ -40,7 +39,7 @@ class TextureRecipe:
 
     name = "texture"
     content = ""
-    compiled = False
+    execution = device = "cpu"
     texture_size = TEXTURE_SIZE
     occupies: Occupied = "nothing"
 
@@ -50,8 +49,8 @@ class TextureRecipe:
     def working_size(self, window_side: int) -> int:
         return window_side
 
-    def made_ready(self, *_wishes: object) -> TextureRecipe:
-        return self
+    def make_ready(self, window_sides: Collection[int]) -> None:
+        pass
 
     def appearance_of(self, source: Source) -> Appearance:
         return tabulate_texture(source)
@@ -63,8 +62,8 @@ class TextureRecipe:
 class TextureRenderer:
     """Draws a source by looking up each (I, U, V) in a table of its 25 x 256 x 256 colours.
 
-    8-bit IUV has no more values than that, so the texture is sampled once per source, by the same
-    sampler as the network's, and a frame costs one look-up a pixel.
+    8-bit IUV has no more values than that, so the texture is sampled once per source, as the
+    network samples its feature map, and a frame costs one look-up a pixel.
     """
 
     name = "texture"
@@ -93,13 +92,14 @@ class TextureRenderer:
 
 def tabulate_texture(source: Source) -> UInt8[np.ndarray, "25 256 256 4"]:
     """Look up the completed texture for every (I, V, U): RGB, and coverage, 0 for part 0."""
-    layout = load_uv_layout()
-    texture = complete_texture(source.texture, source.visibility, layout)
-    v, u = np.mgrid[:CHART_SIZE, :CHART_SIZE].astype(np.uint8)
-    codes = np.stack([np.stack([np.full_like(u, i), u, v]) for i in range(PART_COUNT + 1)])
-    colours = sample_features(texture, torch.from_numpy(codes), layout.charts)
+    texture = complete_texture(source.texture, source.visibility).transpose(1, 2, 0)
+    # from (x, y) in [0, 1] to texels, whose first one's centre lies at 0
+    place = load_uv_tables().charts.reshape(-1, CHART_SIZE, 2) * TWIN_SIZE - np.float32(0.5)
+    x, y, border = place[..., 0], place[..., 1], cv2.BORDER_REPLICATE
+    colours = cv2.remap(texture, x, y, cv2.INTER_LINEAR, borderMode=border)
     table = np.zeros((PART_COUNT + 1, CHART_SIZE, CHART_SIZE, 4), np.uint8)
-    table[..., :3] = ((colours + 1) * 127.5).round().clamp(0, 255).permute(0, 2, 3, 1).numpy()
+    levels = np.rint((colours + 1) * 127.5).clip(0, 255)
+    table[1:, ..., :3] = levels.reshape(PART_COUNT, CHART_SIZE, CHART_SIZE, 3)
     table[1:, ..., 3] = 255
     return table
 
@@ -112,20 +112,16 @@ def soften(mask: UInt8[np.ndarray, "S S"]) -> UInt8[np.ndarray, "S S"]:
 
 
 def complete_texture(
-    texture: Float[Tensor, "1 3 T T"], visibility: Float[Tensor, "1 1 T T"], layout: UVLayout
-) -> Float[Tensor, "1 3 256 256"]:
+    texture: Float32[np.ndarray, "3 256 256"], visibility: Float32[np.ndarray, "1 256 256"]
+) -> Float32[np.ndarray, "3 256 256"]:
     """Fill every texel that is not visible; visible ones pass unchanged."""
-    if texture.shape[-1] != TWIN_SIZE:
-        texture = F.interpolate(texture, (TWIN_SIZE, TWIN_SIZE), mode="area")
-        visibility = (F.interpolate(visibility, (TWIN_SIZE, TWIN_SIZE), mode="area") == 1).float()
-    texture, shown = mirror_texture(texture, visibility, layout.side_twin, layout.depth_twin)
-    colours = texture[0].permute(1, 2, 0).reshape(-1, 3).clone()
-    known = shown[0, 0].reshape(-1) > 0
-    if known.all() or not known.any():
-        return colours.view(1, TWIN_SIZE, TWIN_SIZE, 3).permute(0, 3, 1, 2)
-
-    points, part = layout.position.reshape(-1, 3).numpy(), layout.part.reshape(-1).numpy()
-    seen, values = known.numpy(), colours.numpy()
+    texture, shown = mirror_texture(texture, visibility)
+    seen = shown.reshape(-1) > 0
+    if seen.all() or not seen.any():
+        return texture
+    tables = load_uv_tables()
+    points, part = tables.position.reshape(-1, 3), tables.part.reshape(-1)
+    values = texture.reshape(3, -1).T.copy()
     for limb in PART_GROUPS.values():
         members = np.isin(part, limb)
         given = members & seen
@@ -134,7 +130,7 @@ def complete_texture(
         hidden = members & ~seen
         if hidden.any():
             values[hidden] = _fill(points[hidden], points[given], values[given])
-    return torch.from_numpy(values).view(1, TWIN_SIZE, TWIN_SIZE, 3).permute(0, 3, 1, 2)
+    return values.T.reshape(texture.shape)
 
 
 def _fill(
@@ -147,7 +143,7 @@ def _fill(
     Near the border of what is seen, its pattern continues by reflection at the border; further
     away only a mean of the surroundings can be told.
     """
-    tree = KDTree(seen)
+    tree = scipy.spatial.KDTree(seen)
     distance, nearest = tree.query(hidden, k=min(NEIGHBOURS, len(seen)))
     distance, nearest = distance.reshape(len(hidden), -1), nearest.reshape(len(hidden), -1)
     weight = 1 / np.maximum(distance, NEAR_METRES) ** 2

@@ -128,21 +128,21 @@ def walk(studio) -> Path:
 def test_twenty_jobs_of_a_source_compute_one_feature_map(
     studio, run, walk, checkpoint, monkeypatch
 ) -> None:
-    from motion_transfer.drawing.renderers import network
+    from motion_transfer.drawing.engines.graph_engine import GraphEngine
 
-    encode, encoded = network.encode_source, []
+    encode, encoded = GraphEngine.encode, []
 
     def count(*arguments: Any) -> Any:
         encoded.append(arguments)
         return encode(*arguments)
 
-    monkeypatch.setattr(network, "encode_source", count)
+    monkeypatch.setattr(GraphEngine, "encode", count)
     studio.array(4, name="wave.npy")
     jobs = [
         job(f"{index}.png", driver=("walk.npy", "wave.npy")[index % 2], frames=str(index % 3))
         for index in range(20)
     ]
-    defaults = {"renderer": "nhrr", "weights": str(checkpoint), "compile": False}
+    defaults = {"renderer": "nhrr", "weights": str(checkpoint)}
     result = run(*jobs, defaults=defaults)
     assert result.failed == {}
     assert len(result.done) == 20

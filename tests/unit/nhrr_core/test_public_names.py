@@ -20,7 +20,6 @@ PUBLIC_NAMES = {
     "VARIANTS",
     "ConfigError",
     "Discriminator",
-    "FastRenderNet",
     "FeatureNet",
     "IuvError",
     "LossWeights",

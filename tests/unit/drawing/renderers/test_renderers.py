@@ -6,20 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
+from motion_transfer.drawing.engines import ENGINES, Wish
 from motion_transfer.drawing.renderers.interface import Renderer
-from motion_transfer.drawing.renderers.network import (
-    NeuralRenderer,
-    PreparedNetwork,
-    encode_source,
-    grow_mask,
-)
+from motion_transfer.drawing.renderers.network import grow_mask, open_recipe
 from motion_transfer.drawing.renderers.texture import TextureRenderer, soften, tabulate_texture
 from motion_transfer.drawing.source import Source
 from motion_transfer.render.options import SourceOptions
 from motion_transfer.render.source import read_source
-from motion_transfer.weights.checkpoint import load_checkpoint
 
 
 @pytest.fixture
@@ -27,12 +21,12 @@ def source(studio) -> Source:
     return read_source(SourceOptions(source=(studio.source(),)), 64)
 
 
-@pytest.fixture(params=["texture", "nhrr"])
+@pytest.fixture(params=["texture", *ENGINES])
 def renderer(request, source: Source, checkpoint: Path) -> Renderer:
     if request.param == "texture":
         return TextureRenderer(tabulate_texture(source))
-    model = load_checkpoint(checkpoint)
-    return NeuralRenderer(PreparedNetwork(model, compile=False), encode_source(model, source))
+    recipe = open_recipe(checkpoint, Wish(engine=request.param))
+    return recipe.renderer(recipe.appearance_of(source))
 
 
 def crops(studio, renderer: Renderer) -> np.ndarray:
@@ -86,25 +80,3 @@ def test_softening_never_grows() -> None:
     mask[:30, :30] = 0
     mask[45, 45] = 0
     assert (soften(mask) <= mask).all()
-
-
-def test_a_network_is_compiled_once_for_each_side(
-    source: Source, checkpoint: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(torch, "compile", lambda module, **_: module)
-    model = load_checkpoint(checkpoint)
-    network = PreparedNetwork(model, compile=True)
-    feature_map, drawn = encode_source(model, source), []
-
-    def draw(features: torch.Tensor) -> torch.Tensor:
-        drawn.append(features.shape[-1])
-        return features[:, : model.config.render_outputs]
-
-    monkeypatch.setattr(network, "_draw", draw)
-    for side, calls in ((64, 2), (64, 1), (96, 2), (64, 1)):
-        target = torch.zeros(network.batch_size, 3, side, side, dtype=torch.uint8)
-        network.draw(feature_map, target)
-        assert drawn == [side] * calls, "once ahead, then as asked"
-        drawn.clear()
-    network.compile_for(128)
-    assert drawn == [128]

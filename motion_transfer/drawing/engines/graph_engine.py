@@ -1,0 +1,140 @@
+"""What the engines of ONNX graphs have in common."""
+
+from __future__ import annotations
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import onnx
+from jaxtyping import Float, UInt8
+
+from motion_transfer.drawing.engines import Execution
+from motion_transfer.drawing.engines.interface import FeatureMap, Occupied
+from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
+from motion_transfer.drawing.graphs.whole import (
+    CLEARANCE,
+    DISTANCE,
+    FEATURE_MAP,
+    FRAME,
+    IUV,
+    TEXTURE,
+    UNIT,
+    VISIBILITY,
+    build_encoder,
+    build_painter,
+    build_sampler,
+)
+from motion_transfer.drawing.source import Source
+from motion_transfer.weights.checkpoint import inspect_checkpoint, read_checkpoint, read_ranges
+from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE
+
+
+class Session(Protocol):
+    """A graph that is ready to run, called from several threads."""
+
+    def run(self, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Compute the first output."""
+        ...
+
+    def run_all(self, inputs: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Compute all outputs, by name."""
+        ...
+
+
+class GraphEngine(ABC):
+    """Runs the graphs of one checkpoint, an image a call."""
+
+    batch_size = 1
+    occupies: Occupied = "core"
+
+    def __init__(self, weights: Path, execution: Execution) -> None:
+        self.execution = execution
+        self.config, self._tensors = read_checkpoint(weights)
+        whole = execution.precision == "int8"
+        self._ranges = read_ranges(inspect_checkpoint(weights)) if whole else None
+        self._painters: dict[int, Session] = {}
+        self._opening = threading.Lock()
+
+    @abstractmethod
+    def open(
+        self, model: onnx.ModelProto, sizes: Mapping[str, tuple[int, ...]], *, exact: bool
+    ) -> Session:
+        """Make a graph ready.
+
+        Args:
+            sizes: Of inputs that the graph leaves open, where they are known.
+            exact: Whether it is computed in float32, whatever the engine's precision.
+        """
+
+    def encode(self, source: Source) -> FeatureMap:
+        clearance = source.clearance
+        if clearance is None:
+            clearance = np.zeros((CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32)
+        named = {TEXTURE: source.texture, VISIBILITY: source.visibility, CLEARANCE: clearance}
+        inputs = {name: np.ascontiguousarray(array[None]) for name, array in named.items()}
+        return self.open(build_encoder(self.config, self._tensors), {}, exact=True).run(inputs)
+
+    def prepare(self, side: int) -> None:
+        self._painter(side)
+
+    def take(self, feature_map: FeatureMap) -> FeatureMap:
+        return np.ascontiguousarray(feature_map)
+
+    def draw(
+        self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "B S S 3"]
+    ) -> UInt8[np.ndarray, "B S S K"]:
+        painter = self._painter(iuv.shape[1])
+        frames = [painter.run(self._inputs(feature_map, crop)) for crop in iuv]
+        return frames[0] if len(frames) == 1 else np.concatenate(frames)
+
+    def feature_image(
+        self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "B S S 3"]
+    ) -> Float[np.ndarray, "B C S S"]:
+        inputs = ({FEATURE_MAP: feature_map, IUV: crop[None]} for crop in iuv)
+        return np.concatenate([self._sampler.run(each) for each in inputs])
+
+    @cached_property
+    def _sampler(self) -> Session:
+        return self.open(build_sampler(self.config), {}, exact=True)
+
+    def read_by_convolutions(
+        self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "S S 3"]
+    ) -> dict[str, Float[np.ndarray, "1 C H W"]]:
+        """Give what each of RenderNet's convolutions reads, by its name, in float32."""
+        outputs = self._tapped.run_all(self._inputs(feature_map, iuv))
+        return {name: values for name, values in outputs.items() if name != FRAME}
+
+    @cached_property
+    def _tapped(self) -> Session:
+        model = build_painter(self.config, self._tensors, outline_given=True, taps=True)
+        return self.open(model, {}, exact=True)
+
+    def _inputs(
+        self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "S S 3"]
+    ) -> dict[str, np.ndarray]:
+        inputs = {FEATURE_MAP: feature_map, IUV: np.ascontiguousarray(iuv[None])}
+        if self.config.geometry:
+            inputs[DISTANCE] = signed_distance(iuv)[None, None]
+        if self.config.geometry and self.config.clearance:
+            inputs[UNIT] = np.full((1, 1, 1, 1), clearance_unit(iuv), np.float32)
+        return inputs
+
+    def _painter(self, side: int) -> Session:
+        if side not in self._painters:
+            with self._opening:
+                if side not in self._painters:
+                    self._painters[side] = self._open_painter(side)
+        return self._painters[side]
+
+    def _open_painter(self, side: int) -> Session:
+        tensors, ranges = self._tensors, self._ranges
+        model = build_painter(self.config, tensors, ranges=ranges, outline_given=True)
+        sizes: dict[str, tuple[int, ...]] = {IUV: (1, side, side, 3)}
+        if self.config.geometry:
+            sizes[DISTANCE] = (1, 1, side, side)
+        return self.open(model, sizes, exact=False)

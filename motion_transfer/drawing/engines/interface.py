@@ -1,0 +1,59 @@
+"""What an engine does for one checkpoint, on one device."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from motion_transfer.drawing.source import Source
+from nhrr_core.config import ModelConfig
+
+Occupied = Literal["core", "device", "nothing"]
+"""What a call keeps busy for long: a `core`, so that there are threads for calls alone, one for
+each worker; the `device`, so that one thread makes them; or `nothing`, and whoever wants a picture
+draws it."""
+
+FeatureMap = Float[np.ndarray, "1 D T T"]
+
+
+class Engine(Protocol):
+    """A checkpoint that is ready to run; called from several threads.
+
+    Attributes:
+        batch_size: Frames a call.
+        occupies: What a call keeps busy.
+    """
+
+    config: ModelConfig
+    batch_size: int
+    occupies: Occupied
+
+    def encode(self, source: Source) -> FeatureMap:
+        """Compute a source's feature map, the same bits for any number of threads."""
+        ...
+
+    def prepare(self, side: int) -> None:
+        """Make ready for crops of that side, px."""
+        ...
+
+    def take(self, feature_map: FeatureMap) -> Any:
+        """Bring a feature map to where it is read."""
+        ...
+
+    def draw(
+        self, feature_map: Any, iuv: UInt8[np.ndarray, "B S S 3"]
+    ) -> UInt8[np.ndarray, "B S S K"]:
+        """Draw frames: RGB, and alpha where the model has it.
+
+        Args:
+            feature_map: What `take` gave.
+        """
+        ...
+
+    def feature_image(
+        self, feature_map: Any, iuv: UInt8[np.ndarray, "B S S 3"]
+    ) -> Float[np.ndarray, "B C S S"]:
+        """Give what RenderNet sees, in float32."""
+        ...
