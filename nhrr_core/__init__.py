@@ -87,40 +87,24 @@ __all__ = [
     "unfold_clearance",
 ]
 
-_LATE = {
-    "clearance": ["unfold_clearance"],
-    "discriminator": ["Discriminator", "Verdict"],
-    "feature_net": ["FeatureNet"],
-    "iuv": ["check_iuv", "keep_parts", "normalise_iuv"],
-    "losses": [
-        "LossWeights",
-        "adversarial_loss",
-        "alpha_loss",
-        "discriminator_loss",
-        "face_identity_loss",
-        "generator_loss",
-        "matching_loss",
-        "perceptual_loss",
-        "r1_penalty",
-        "texture_loss",
-    ],
-    "model": ["NeuralReRenderer"],
-    "render_net": ["RenderNet"],
-    "sampling": ["sample_features"],
-    "texture": [
-        "extract_texture",
-        "fill_texture",
-        "measure_surroundings",
-        "merge_textures",
-        "mirror_texture",
-        "shrink_texture",
-    ],
-    "uv_layout": ["UVLayout", "load_uv_layout", "texture_coordinates"],
-    "uv_tables": ["UVTables", "load_uv_tables"],
+_NAMES_OF = {
+    "clearance": "unfold_clearance",
+    "discriminator": "Discriminator Verdict",
+    "feature_net": "FeatureNet",
+    "iuv": "check_iuv keep_parts normalise_iuv",
+    "losses": "LossWeights adversarial_loss alpha_loss discriminator_loss face_identity_loss"
+    " generator_loss matching_loss perceptual_loss r1_penalty texture_loss",
+    "model": "NeuralReRenderer",
+    "render_net": "RenderNet",
+    "sampling": "sample_features",
+    "texture": "extract_texture fill_texture measure_surroundings merge_textures mirror_texture"
+    " shrink_texture",
+    "uv_layout": "UVLayout load_uv_layout texture_coordinates",
+    "uv_tables": "UVTables load_uv_tables",
 }
 """What is imported late, by module: the imports above, which only type checkers read."""
 
-_HOMES = {name: module for module, names in _LATE.items() for name in names}
+_HOMES = {name: home for home, names in _NAMES_OF.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:

@@ -78,7 +78,10 @@ def _resize(
 
 def pick_nearest(values: Shaped[np.ndarray, "*C t t"], size: int) -> Shaped[np.ndarray, "*C T T"]:
     """Bring a map to another size; each texel is the one at its centre."""
-    at = _centres(size, values.shape[-1])
+    length = values.shape[-1]
+    if size == length:
+        return values
+    at = (2 * np.arange(size) + 1) * length // (2 * size)
     return values[..., at[:, None], at]
 
 
@@ -91,8 +94,3 @@ def twins(size: int) -> tuple[Int64[np.ndarray, " L"], Int64[np.ndarray, " L"]]:
         row, column = np.divmod(pick_nearest(table, size), own)
         found.append((row * size // own * size + column * size // own).reshape(-1))
     return found[0], found[1]
-
-
-def _centres(size: int, length: int) -> Int64[np.ndarray, " T"]:
-    """Which of `length` equal cells of a line the centres of `size` equal ones lie in."""
-    return (2 * np.arange(size) + 1) * length // (2 * size)

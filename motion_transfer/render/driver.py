@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import UInt8
@@ -19,11 +20,13 @@ from motion_transfer.media.iuv.formats import ChannelOrder, Missing, names_file
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.people import FIRST_USE, is_cached, is_motion
+from motion_transfer.people import is_motion
 from motion_transfer.render.inputs import motion_files
 from motion_transfer.render.options import InputOptions
-from motion_transfer.render.picture_driver import ORDER, PictureDriver, estimate_driver
 from motion_transfer.render.plan import SeenFrame, frame_range, scan_people
+
+if TYPE_CHECKING:
+    from motion_transfer.render.picture_driver import PictureDriver
 
 
 @dataclass(frozen=True)
@@ -134,6 +137,9 @@ def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driv
     """
     inputs = Inputs(motion_files(options))
     if _are_pictures(options):
+        # what estimates takes long to load, and a driver that is IUV needs none of it
+        from motion_transfer.render.picture_driver import ORDER, estimate_driver
+
         pictures = estimate_driver(options, folder, listener, inputs)
         file = DriverFile(pictures.iuv, "fail", ORDER)
         return Driver(options.driver, file, file.open(), pictures.frame_rate, inputs, pictures)
@@ -142,8 +148,11 @@ def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driv
             f"--fit-body compares landmarks, and IUV as in the driver {options.driver} has none;"
             " give the video or pictures that it was made from, or leave out --fit-body"
         )
-    if is_motion(options.driver) and not is_cached():
-        listener(Notice(FIRST_USE))  # now: what follows takes minutes
+    if is_motion(options.driver):
+        from motion_transfer.people import FIRST_USE, is_cached
+
+        if not is_cached():
+            listener(Notice(FIRST_USE))  # now: what follows takes minutes
     missing = options.missing or "fail"
     stream = open_stream(options.driver, missing=missing)
     if stream.gaps:

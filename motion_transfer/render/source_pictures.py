@@ -28,7 +28,6 @@ from motion_transfer.drawing.person import (
 from motion_transfer.drawing.source import SourcePicture, read_person
 from motion_transfer.drawing.views import rate_texels
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.clip import follow_people
 from motion_transfer.estimate.interface import PersonEstimate
 from motion_transfer.estimate.opening import open_estimator
 from motion_transfer.events import FramesDone, Listener, Stage
@@ -200,6 +199,8 @@ def _watch(
     pictures: PictureStream, options: SourceOptions
 ) -> Generator[SourcePicture | None, None, None]:
     """The frames of a video, in which the person is looked for."""
+    from motion_transfer.estimate.clip import follow_people
+
     estimator = open_estimator(
         options.estimator, options.estimator_model, frame_rate=pictures.frame_rate
     )

@@ -7,8 +7,8 @@ from typing import Literal
 
 import cv2
 import numpy as np
+import scipy  # whose parts are imported when they are used
 from jaxtyping import Bool, Float, UInt8
-from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.media.nearest import take_nearest
 
@@ -98,7 +98,7 @@ def _find_movement(person: Frame, partner: Frame, part: int) -> Movement | None:
     (rows, columns), (other_rows, other_columns) = np.nonzero(mine), np.nonzero(other)
     chosen = np.linspace(0, len(rows) - 1, min(len(rows), MATCHED_PIXELS)).astype(int)
     rows, columns = rows[chosen], columns[chosen]
-    distance, match = cKDTree(partner[other][:, 1:]).query(
+    distance, match = scipy.spatial.KDTree(partner[other][:, 1:]).query(
         person[rows, columns][:, 1:], distance_upper_bound=MATCH_LEVELS
     )
     found = np.isfinite(distance)

@@ -12,13 +12,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-import scipy  # its parts are imported when they are used, which nothing else here waits for
+import scipy  # whose parts are imported when they are used
 from jaxtyping import Float, Float32, UInt8
 
 from motion_transfer.drawing.engines.interface import Occupied
 from motion_transfer.drawing.renderers.interface import Appearance
 from motion_transfer.drawing.source import Source
-from motion_transfer.drawing.textures import mirror_texture
+from motion_transfer.drawing.textures import mirror_texture, pick_nearest
 from nhrr_core import PART_COUNT, PART_GROUPS, load_uv_tables
 from nhrr_core.uv_tables import CHART_SIZE, TWIN_SIZE
 
@@ -112,9 +112,10 @@ def soften(mask: UInt8[np.ndarray, "S S"]) -> UInt8[np.ndarray, "S S"]:
 
 
 def complete_texture(
-    texture: Float32[np.ndarray, "3 256 256"], visibility: Float32[np.ndarray, "1 256 256"]
+    texture: Float32[np.ndarray, "3 T T"], visibility: Float32[np.ndarray, "1 T T"]
 ) -> Float32[np.ndarray, "3 256 256"]:
     """Fill every texel that is not visible; visible ones pass unchanged."""
+    texture, visibility = (pick_nearest(each, TWIN_SIZE) for each in (texture, visibility))
     texture, shown = mirror_texture(texture, visibility)
     seen = shown.reshape(-1) > 0
     if seen.all() or not seen.any():

@@ -18,8 +18,8 @@ from functools import cache
 
 import cv2
 import numpy as np
+import scipy  # whose parts are imported when they are used
 from jaxtyping import Float, UInt8
-from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.errors import IuvFileError
 from nhrr_core.uv_tables import TWIN_SIZE, load_uv_tables
@@ -73,7 +73,7 @@ def check_scale(places: Frame, where: str) -> None:
 
 
 @cache
-def _nearest_entries() -> tuple[cKDTree, UInt8[np.ndarray, "N 3"]]:
+def _nearest_entries() -> tuple[scipy.spatial.KDTree, UInt8[np.ndarray, "N 3"]]:
     """Index the places of all table entries that a surface covers, with their (I, U, V)."""
     charts = load_uv_tables().charts
     words = np.round(charts * WORD).astype(np.int64)
@@ -89,4 +89,4 @@ def _nearest_entries() -> tuple[cKDTree, UInt8[np.ndarray, "N 3"]]:
     originals = order[np.flatnonzero(np.diff(group.ravel()[order], prepend=-1))]
     part, v, u = np.unravel_index(originals, keys.shape)
     entries = np.stack([part + 1, u, v], -1).astype(np.uint8)
-    return cKDTree(charts.reshape(-1, 2)[originals].astype(np.float64)), entries
+    return scipy.spatial.KDTree(charts.reshape(-1, 2)[originals].astype(np.float64)), entries
