@@ -35,7 +35,8 @@ from motion_transfer.media.iuv.formats import find_iuv_of
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.people import PeopleStream
 from motion_transfer.render.adapted import demo_poses
-from motion_transfer.training.adaptation import AdaptationSettings, adapt_model
+from motion_transfer.training.adaptation import adapt_model
+from motion_transfer.training.adaptation_settings import AdaptationSettings
 from motion_transfer.training.feature_networks import load_efficientnet_lite0
 from motion_transfer.training.metrics import feature_distance, shown_pixels
 from motion_transfer.training.pictures import PersonPicture

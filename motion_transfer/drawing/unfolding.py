@@ -50,7 +50,8 @@ class Charts(NamedTuple):
 def _charts() -> Charts:
     axes = np.ascontiguousarray(np.moveaxis(load_uv_tables().charts, -1, 0))
     torn = np.zeros(axes.shape[1:], bool)
-    torn[:, :-1, :-1] = (_spans(axes) > MAX_ENTRY_STEP).any(0)
+    for chart, own in zip(axes.swapaxes(0, 1), torn, strict=True):  # which a core's cache holds
+        own[:-1, :-1] = (_spans(chart) > MAX_ENTRY_STEP).any(0)
     x, y = axes.reshape(2, -1)
     return Charts(x, y, torn.reshape(-1))
 

@@ -11,7 +11,6 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
-import torch
 from jaxtyping import UInt8
 
 from motion_transfer.drawing.kept_source import load_picture
@@ -31,8 +30,7 @@ from motion_transfer.render.inputs import model_files, photo_files
 from motion_transfer.render.options import AdaptOptions, RenderOptions, SourceOptions
 from motion_transfer.render.source import check_photos
 from motion_transfer.render.source_pictures import read_pictures
-from motion_transfer.training.adaptation import AdaptationSettings, adapt_model
-from motion_transfer.training.feature_networks import load_efficientnet_lite0
+from motion_transfer.training.adaptation_settings import AdaptationSettings
 from motion_transfer.version import __version__
 from motion_transfer.weights.checkpoint import (
     digest_weights,
@@ -103,6 +101,12 @@ def adapt_person(
     if final.is_file():
         return final
     require_extra("adapt")
+    # now: it takes seconds, and what was learned before needs none of it
+    import torch
+
+    from motion_transfer.training.adaptation import adapt_model
+    from motion_transfer.training.feature_networks import load_efficientnet_lite0
+
     judge = load_efficientnet_lite0()
     pictures = _read_person(options, listener)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")

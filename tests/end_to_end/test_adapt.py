@@ -62,7 +62,7 @@ def test_weights_say_where_they_come_from(adapt, mt, studio, checkpoint) -> None
 
 
 def test_what_was_learned_is_found_again(adapt, studio, cache, monkeypatch) -> None:
-    import motion_transfer.render.adapted as module
+    import motion_transfer.training.adaptation as module
 
     photo = studio.source()
     assert adapt("--source", photo).code == 0

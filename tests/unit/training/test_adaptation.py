@@ -19,7 +19,8 @@ from motion_transfer.errors import TrainingError
 from motion_transfer.events import Event, FramesDone, Notice, Stage
 from motion_transfer.media.pictures.photo import Photo
 from motion_transfer.training import adaptation
-from motion_transfer.training.adaptation import AdaptationSettings, adapt_model, anneal
+from motion_transfer.training.adaptation import adapt_model, anneal
+from motion_transfer.training.adaptation_settings import AdaptationSettings
 from motion_transfer.training.feature_networks import FeatureNetwork
 from motion_transfer.training.lessons import (
     Lessons,
