@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 import onnx
+import xxhash
 from onnx import TensorProto, helper, numpy_helper
 
 OPSET, IR_VERSION = 17, 8  # the oldest that has all that is used: GridSample is of 16
 
-FLOAT, UINT8, INT32 = TensorProto.FLOAT, TensorProto.UINT8, TensorProto.INT32
+FLOAT, UINT8 = TensorProto.FLOAT, TensorProto.UINT8
+INT32, INT64 = TensorProto.INT32, TensorProto.INT64
 
 Value = str | int | float | np.ndarray
 """The name of a tensor in the graph, or a constant; numbers are float32."""
@@ -29,7 +31,7 @@ class Graph:
 
     def __init__(self) -> None:
         self._nodes: list[onnx.NodeProto] = []
-        self._constants: list[onnx.TensorProto] = []
+        self._constants: dict[bytes, onnx.TensorProto] = {}
         self._inputs: list[onnx.ValueInfoProto] = []
         self._outputs: list[onnx.ValueInfoProto] = []
 
@@ -41,11 +43,15 @@ class Graph:
         return output
 
     def constant(self, value: float | np.ndarray) -> str:
-        """Hold an array, as it is, or a number, as float32."""
+        """Hold an array, as it is, or a number, as float32; equal ones are held once."""
         array = value if isinstance(value, np.ndarray) else np.array(value, np.float32)
-        name = f"constant_{len(self._constants)}"
-        self._constants.append(numpy_helper.from_array(np.array(array, order="C"), name))
-        return name
+        array = np.array(array, order="C")
+        kind = f"{array.dtype.str}{array.shape}".encode()
+        content = kind + xxhash.xxh3_128_digest(array)  # some are tables of 16 MB
+        if content not in self._constants:
+            name = f"constant_{len(self._constants)}"
+            self._constants[content] = numpy_helper.from_array(array, name)
+        return self._constants[content].name
 
     def input(self, name: str, kind: int, shape: Sequence[int | str]) -> str:
         """Declare an input; sizes that are words are open."""
@@ -75,7 +81,11 @@ class Graph:
             notes: Its metadata.
         """
         graph = helper.make_graph(
-            self._nodes, name, self._inputs, self._outputs, initializer=self._constants
+            self._nodes,
+            name,
+            self._inputs,
+            self._outputs,
+            initializer=list(self._constants.values()),
         )
         opsets = [helper.make_opsetid("", OPSET)]
         model = helper.make_model(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float32, Int64
 
-from motion_transfer.drawing.graphs.graph import FLOAT, INT32, Graph
+from motion_transfer.drawing.graphs.graph import FLOAT, INT32, INT64, Graph
 from motion_transfer.drawing.graphs.networks import enlarge
 from nhrr_core.config import CLEARANCE_SIZE, FILL_FROM, FILL_METRES, FILL_TO, PLACE_METRES
 from nhrr_core.uv_tables import CHART_SIZE, UVTables, load_uv_tables
 
 TINY = 1e-6  # far below the smallest weight that is not 0, a sixteenth
+WORD = 65535.0  # the largest of 16 bits
 LEAST = 1e-20  # likewise of a place's weight, even across the whole body
 
 
@@ -112,13 +113,20 @@ def look_up(graph: Graph, feature_map: str, iuv: str) -> tuple[str, str]:
         iuv: 1 x H x W x 3 uint8.
     Returns: The features, 1 x D x H x W, 0 outside the body; and the body, 1 x 1 x H x W, 1 or 0.
     """
-    charts = load_uv_tables().charts.reshape(-1, 2)
-    grid = graph("Gather", charts * 2 - 1, _chart_rows(graph, iuv), axis=0)
+    grid = graph("Sub", graph("Mul", _find_places(graph, iuv), 2), 1)
     sampled = graph("GridSample", feature_map, grid, mode="bilinear", padding_mode="border")
     part = graph("Gather", iuv, np.array(0), axis=3)
     body = graph("Cast", graph("Unsqueeze", part, np.array([1])), to=FLOAT)
     body = graph("Min", body, 1)
     return graph("Mul", sampled, body), body
+
+
+def _find_places(graph: Graph, iuv: str) -> str:
+    """Where each pixel lies in the texture, (x, y), 1 x H x W x 2; the background is part 1's."""
+    # in 16 bits, as the table is kept: half of what there is to load
+    charts = (load_uv_tables().charts * WORD).round().astype(np.uint16).reshape(-1, 2)
+    words = graph("Gather", charts, _chart_rows(graph, iuv), axis=0)
+    return graph("Div", graph("Cast", words, to=FLOAT), WORD)
 
 
 def _chart_rows(graph: Graph, iuv: str) -> str:
@@ -191,12 +199,10 @@ def _nearest_along(graph: Graph, squared: str, axis: int, reach: int) -> str:
 
 def pixels_per_texel(graph: Graph, iuv: str, body: str) -> str:
     """Measure how large the body is in its image, 1 x 1 x 1 x 1, see `nhrr_core.clearance`."""
-    place = load_uv_tables().charts.reshape(-1, 2)
-    column, row = (
-        np.clip((axis * CLEARANCE_SIZE).astype(np.int64), 0, CLEARANCE_SIZE - 1) for axis in place.T
-    )
-    texel = row * CLEARANCE_SIZE + column
-    index = graph("Gather", texel, graph("Reshape", _chart_rows(graph, iuv), np.array([-1])))
+    texels = graph("Mul", _find_places(graph, iuv), float(CLEARANCE_SIZE))
+    texels = graph("Cast", graph("Clip", texels, 0, float(CLEARANCE_SIZE - 1)), to=INT64)
+    row = graph("Mul", texels, np.array([1, CLEARANCE_SIZE]))
+    index = graph("Reshape", graph("ReduceSum", row, np.array([3]), keepdims=0), np.array([-1]))
     flat = graph("Reshape", body, np.array([-1]))
     # what is not the body's falls on one more texel, which does not count
     beyond = np.array(CLEARANCE_SIZE**2)
