@@ -47,7 +47,7 @@ class Graph:
         array = value if isinstance(value, np.ndarray) else np.array(value, np.float32)
         array = np.array(array, order="C")
         kind = f"{array.dtype.str}{array.shape}".encode()
-        content = kind + xxhash.xxh3_128_digest(array)  # some are tables of 16 MB
+        content = kind + xxhash.xxh3_128_digest(array.data)  # some are tables of 16 MB
         if content not in self._constants:
             name = f"constant_{len(self._constants)}"
             self._constants[content] = numpy_helper.from_array(array, name)
