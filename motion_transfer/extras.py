@@ -23,7 +23,6 @@ class Extra:
 
 EXTRAS = {
     "heic": Extra("HEIC photos need", {"pillow_heif": "pillow-heif"}),
-    "estimate": Extra("raw pictures need", {"ai_edge_litert": "ai-edge-litert"}),
     "people": Extra("synthetic people need", {"anny": "anny", "warp": "warp-lang"}),
     "train": Extra("training needs", {"accelerate": "accelerate"}),
     "tensorboard": Extra("curves need", {"tensorboard": "tensorboard"}),

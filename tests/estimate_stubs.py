@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -17,7 +18,7 @@ from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_landmarks
 from motion_transfer.estimate.interface import LANDMARK, LANDMARK_COUNT, Landmarks, PersonEstimate
 from motion_transfer.estimate.iuv.network import PARTS, IuvLogits
 from motion_transfer.estimate.models import MODEL_FILES, find_model
-from motion_transfer.extras import require_extra
+from motion_transfer.media.pictures.stream import PictureStream
 
 RED, GREEN, BLUE = (250, 0, 0), (0, 250, 0), (0, 0, 250)
 COLOURS = (RED, GREEN, BLUE)
@@ -29,6 +30,23 @@ def scene(*boxes: tuple[tuple[int, int, int], Box], size=(60, 80), ground=90) ->
     for colour, box in boxes:
         picture[box.slices] = colour
     return picture
+
+
+class FramesInMemory(PictureStream):
+    """Frames as a clip; counts those that were taken."""
+
+    def __init__(self, frames: list[np.ndarray]) -> None:
+        super().__init__(Path("clip"), len(frames), *frames[0].shape[:2])
+        self._frames = frames
+        self.taken = 0
+
+    def read(self) -> Iterator[np.ndarray]:
+        for frame in self._frames:
+            self.taken += 1
+            yield frame
+
+    def where(self, index: int) -> str:
+        return f"frame {index}"
 
 
 class RectangleEstimator:
@@ -158,7 +176,6 @@ def iuv_logits(parts: np.ndarray, uv: float = 0.5) -> IuvLogits:
 def find_models() -> dict[str, Path]:
     """BlazePose's model files by name; a test that asks is skipped where they were not fetched."""
     try:
-        require_extra("estimate")
         return {file.name: find_model(file) for file in MODEL_FILES}
     except InputError as error:
         pytest.skip(str(error))

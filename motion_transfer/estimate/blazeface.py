@@ -1,4 +1,4 @@
-"""BlazeFace, the network that finds faces: a TensorFlow Lite model run on the CPU.
+"""BlazeFace, the network that finds faces.
 
 It looks at 128 x 128 pixels and says for each of 896 anchors whether a face is there, and where. It
 was made for the front cameras of telephones: a face should fill a good part of what it sees.
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from motion_transfer.estimate.blazepose.networks import LiteModel
+from motion_transfer.estimate.inference import open_network
 
 FACE_SIZE = 128
 LAYERS = ((8, 2), (16, 6))
@@ -42,17 +42,18 @@ class FaceDetection:
 
 
 class FaceDetector:
-    """The detector; one object serves one thread.
+    """The detector.
 
-    Raises: InputError if the file is no such model, or the package that runs it is missing.
+    Raises: InputError if the file is no model.
     """
 
     def __init__(self, model: Path) -> None:
-        self._model = LiteModel(model, threads=1)
+        self._network = open_network(model)
 
     def detect(self, picture: UInt8[np.ndarray, "128 128 3"]) -> FaceDetection:
         """Find the face that it is most certain of, however uncertain that is."""
-        raw, logits = self._model.run(picture.astype(np.float32) / 127.5 - 1)
+        seen = picture[None].astype(np.float32) / 127.5 - 1
+        raw, logits = (output[0] for output in self._network.run(seen))
         best = int(logits[:, 0].argmax())
         score = 1 / (1 + np.exp(-float(logits[best, 0].clip(-100, 100))))
         offset, size = raw[best].reshape(POINTS, 2)[:2] / FACE_SIZE

@@ -1,40 +1,48 @@
 """A clip of raw pictures as IUV, frame after frame, one person or several in each.
 
-Decoding, estimating and what becomes of the frames run in a thread each, a few frames apart.
+Decoding, finding people, and what becomes of the frames run in a thread each, a few frames apart;
+what is left to do about the people found is done for several frames at once.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import combinations, islice
-from typing import Literal, TypeVar
+from typing import Literal
 
 import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.cores import core_count
 from motion_transfer.drawing.person import EVERYBODY, Box, Follower
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.interface import Estimator, Landmarks, PersonEstimate
+from motion_transfer.estimate.ahead import read_ahead, work_ahead
+from motion_transfer.estimate.interface import (
+    Estimator,
+    Finish,
+    Landmarks,
+    PersonEstimate,
+    StagedEstimator,
+)
 from motion_transfer.estimate.shots import mark_shots
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.repair.gaps import fill_gaps
 
 AHEAD_FRAMES = 4  # a few, so that a slow frame of one thread does not stop the others
 
-POLL_SECONDS = 0.05  # waiting without end would not hear Ctrl-C everywhere
-END = object()
+AT_ONCE = 2
+"""How many frames are finished at once, see `StagedEstimator`. Measured: BlazePose takes as long to
+find somebody, which is done frame after frame, as the IUV takes to be painted."""
 
 NOBODY = 255  # higher than anybody's number, so that the lowest number around a pixel is a person
 MOST_PEOPLE = NOBODY - 1  # in a frame; those after them are left out
 
 MissingPeople = Literal["hold", "background", "fail"]
 Frame = UInt8[np.ndarray, "H W C"]
-T = TypeVar("T")
 
 
 @dataclass
@@ -138,9 +146,13 @@ def lay_iuv(
     pixels are taken for one person's; so between people who touch, one pixel of background stays.
     """
     iuv = np.zeros((height, width, 3), np.uint8)
+    people = people[:MOST_PEOPLE]
+    if not any(_touch(a.box, b.box) for a, b in combinations(people, 2)):
+        for person in people:
+            iuv[person.box.slices] = person.iuv
+        return iuv
     owner = np.full((height, width), NOBODY, np.uint8)
     claim = np.full((height, width), -1, np.int16)  # below alpha 0, which may be a body, too
-    people = people[:MOST_PEOPLE]
     for number, person in enumerate(people):
         place = person.box.slices
         wins = (person.iuv[..., 0] > 0) & (person.alpha > claim[place])
@@ -148,9 +160,8 @@ def lay_iuv(
         np.copyto(iuv[place], person.iuv, where=wins[..., None])
         np.copyto(claim[place], person.alpha, where=wins)
         np.copyto(owner[place], number, where=wins)
-    if any(_touch(a.box, b.box) for a, b in combinations(people, 2)):
-        nearby = cv2.erode(owner, np.ones((3, 3), np.uint8))  # the lowest number around
-        iuv *= (nearby == owner)[..., None]
+    nearby = cv2.erode(owner, np.ones((3, 3), np.uint8))  # the lowest number around
+    iuv *= (nearby == owner)[..., None]
     return iuv
 
 
@@ -197,18 +208,39 @@ def follow_people(
     """
     follower = Follower(person)
     marked = mark_shots(islice(pictures.read(), chosen.stop))
-    with closing(read_ahead(marked, AHEAD_FRAMES)) as frames:
-        for index, (picture, begins) in enumerate(frames):
-            if index < chosen.start:
-                yield SeenPicture(index, picture, False, False, [])
-                continue
-            # the first frame that is looked at has no past, wherever its shot began
-            begins = begins or index == chosen.start
+    at_once = min(AT_ONCE, core_count())
+    with (
+        closing(read_ahead(marked, AHEAD_FRAMES)) as frames,
+        closing(work_ahead(_locate(frames, estimator, chosen), AHEAD_FRAMES, at_once)) as located,
+    ):
+        for index, (picture, begins, people) in enumerate(located):
             if begins:
-                estimator.start_shot()
                 follower.start_shot()
-            people = follower.pick(estimator.estimate(picture), pictures.where(index))
-            yield SeenPicture(index, picture, True, begins, people)
+            picked = follower.pick(people, pictures.where(index))
+            yield SeenPicture(index, picture, index >= chosen.start, begins, picked)
+
+
+def _locate(
+    frames: Iterable[tuple[Frame, bool]], estimator: Estimator, chosen: range
+) -> Generator[Callable[[], tuple[Frame, bool, list[PersonEstimate]]], None, None]:
+    """What has to see one frame after the other; gives what is left to do."""
+    for index, (picture, begins) in enumerate(frames):
+        if index < chosen.start:
+            yield partial(_finish, picture, False, list)
+            continue
+        # the first frame that is looked at has no past, wherever its shot began
+        begins = begins or index == chosen.start
+        if begins:
+            estimator.start_shot()
+        staged = isinstance(estimator, StagedEstimator)
+        finish = estimator.locate(picture) if staged else partial(list, estimator.estimate(picture))
+        yield partial(_finish, picture, begins, finish)
+
+
+def _finish(
+    picture: Frame, begins: bool, finish: Finish
+) -> tuple[Frame, bool, list[PersonEstimate]]:
+    return picture, begins, finish()
 
 
 def _draw(
@@ -232,7 +264,7 @@ def _draw(
                         " --missing hold or --missing background"
                     )
             iuv = lay_iuv(seen.people, height, width)
-            yield np.dstack([iuv, lay_alpha(seen.people, height, width)]) if with_alpha else iuv
+            yield cv2.merge([iuv, lay_alpha(seen.people, height, width)]) if with_alpha else iuv
 
 
 def _nobody(pictures: PictureStream, frame_count: int) -> InputError:
@@ -241,30 +273,3 @@ def _nobody(pictures: PictureStream, frame_count: int) -> InputError:
         f"nobody was found in {what}; it should show a person, upright and larger than about"
         " 60 pixels, whose IUV can otherwise be made by DensePose"
     )
-
-
-def read_ahead(items: Iterable[T], count: int) -> Generator[T, None, None]:
-    """Make the items, in order, in a thread of their own; at most `count` wait.
-
-    Close the generator (`contextlib.closing`) where it may not be read to its end: that ends the
-    thread, and closes `items` there if that is a generator.
-
-    Raises: Whatever making an item raises, in its place.
-    """
-    iterator = iter(items)
-    with ThreadPoolExecutor(1) as thread:
-        coming = deque(thread.submit(next, iterator, END) for _ in range(count))
-        try:
-            while True:
-                while not coming[0].done():
-                    wait([coming[0]], POLL_SECONDS)
-                item = coming.popleft().result()
-                if item is END:
-                    return
-                coming.append(thread.submit(next, iterator, END))
-                yield item  # pyright: ignore[reportReturnType]
-        finally:
-            for future in coming:
-                future.cancel()
-            if isinstance(items, Generator):
-                thread.submit(items.close)

@@ -7,8 +7,9 @@ frame; `PersonEstimate.on_frame` puts them back.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float32, UInt8
@@ -103,6 +104,19 @@ class Estimator(Protocol):
 
     def start_shot(self) -> None:
         """Forget who was where: the next frame has nothing to do with the last one."""
+
+
+Finish = Callable[[], list[PersonEstimate]]
+"""Finds out the rest about the people of a frame."""
+
+
+@runtime_checkable
+class StagedEstimator(Estimator, Protocol):
+    """An estimator of which only a part has to see one frame after the other."""
+
+    def locate(self, frame: UInt8[np.ndarray, "H W 3"]) -> Finish:
+        """Look at the next frame of a shot. What is left to do, any thread may do at any time."""
+        ...
 
 
 def check_frame(frame: np.ndarray) -> None:

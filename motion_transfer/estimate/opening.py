@@ -41,7 +41,7 @@ class EstimatorEntry:
 ESTIMATORS = {
     "blazepose": EstimatorEntry(
         ("motion_transfer.estimate.blazepose", "BlazePoseEstimator"),
-        takes=("frame_rate", "threads", "fit"),
+        takes=("frame_rate", "fit"),
     ),
     "densepose": EstimatorEntry(
         ("motion_transfer.estimate.densepose", "DensePoseEstimator"),
@@ -90,7 +90,6 @@ def open_estimator(
     model: Path | None,
     *,
     frame_rate: Fraction | None = None,
-    threads: int = 1,
     fit: BodyFit | None = None,
 ) -> Estimator:
     """Open an estimator, ready for a clip.
@@ -98,14 +97,13 @@ def open_estimator(
     Args:
         model: The user's file, for an estimator that runs one.
         frame_rate: The clip's, for smoothing; None means 30.
-        threads: Of each of the estimator's own networks.
         fit: Other proportions for everybody.
     Raises: InputError as `check_estimator`; InputError and WeightsError where a model or a package
         is missing, saying how to get it.
     """
     check_estimator(name, model, fit=fit is not None)
     rate = float(frame_rate or DEFAULT_RATE)
-    given = {"model": model, "frame_rate": rate, "threads": threads, "fit": fit}
+    given = {"model": model, "frame_rate": rate, "fit": fit}
     module, estimator = ESTIMATORS[name].home
     takes = {what: given[what] for what in ESTIMATORS[name].takes}
     return getattr(import_module(module), estimator)(**takes)

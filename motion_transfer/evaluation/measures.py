@@ -23,7 +23,6 @@ from torch import Tensor
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.models import FACE_DETECTOR, FACE_NETWORK, ModelFile, is_there
 from motion_transfer.evaluation.framing import Image, PairPictures
-from motion_transfer.extras import missing_packages
 from motion_transfer.training.metrics import (
     FLICKER_TEXELS,
     average_ssim,
@@ -130,21 +129,19 @@ class MeasureRow:
         needs: What has to be given, or to be in the cache already; a measure whose need is met is
             taken unless others are named.
         package: A distribution that takes part in computing it, besides `PACKAGES`.
-        model: The file in the cache; `extra`: what runs it.
+        model: The file in the cache.
     """
 
     opener: str
     needs: Literal["nothing", "weights", "clips", "model"] = "nothing"
     package: str | None = None
     model: ModelFile | None = None
-    extra: str | None = None
 
     def is_met(self, weights: Path | None, has_clips: bool) -> bool:
         """Tell whether what it needs is there."""
         if self.needs == "model":
             assert self.model is not None
-            runs = self.extra is None or not missing_packages(self.extra)
-            return runs and is_there(self.model)
+            return is_there(self.model)
         return {"nothing": True, "clips": has_clips, "weights": weights is not None}[self.needs]
 
 
@@ -158,9 +155,7 @@ MEASURES = {
     EFFICIENTNET: MeasureRow(f"{__name__}:load_efficientnet"),
     "hidden": MeasureRow(f"{_REGIONS}:load_hidden"),
     "head": MeasureRow(f"{_REGIONS}:load_head"),
-    "faces": MeasureRow(
-        f"{_FACES}:FacesMeasure", "model", "ai-edge-litert", FACE_DETECTOR, "estimate"
-    ),
+    "faces": MeasureRow(f"{_FACES}:FacesMeasure", "model", "openvino", FACE_DETECTOR),
     "identity": MeasureRow(f"{_FACES}:load_identity", "model", model=FACE_NETWORK),
     "checkerboard": MeasureRow(f"{_REGIONS}:CheckerboardMeasure"),
     "lpips": MeasureRow(f"{_OUTSIDE}:LpipsMeasure", "weights", "lpips"),

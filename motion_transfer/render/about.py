@@ -18,8 +18,8 @@ from motion_transfer.drawing.kept_source import inspect_source
 from motion_transfer.drawing.person import find_people
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.iuv.network import SHIPPED as IUV_NETWORK
-from motion_transfer.estimate.iuv.network import has_shipped
+from motion_transfer.estimate.iuv.weights import SHIPPED as IUV_NETWORK
+from motion_transfer.estimate.iuv.weights import has_shipped
 from motion_transfer.estimate.models import MODEL_FILES, is_there, models_folder
 from motion_transfer.extras import install_command, missing_packages
 from motion_transfer.media.iuv.blends import BlendMeter
@@ -85,8 +85,6 @@ def describe_setup() -> Facts:
 
 
 def _describe_estimators() -> str:
-    if missing_packages("estimate"):
-        return install_command("estimate")
     folder = models_folder()
     lacking = []
     if absent := [file.name for file in MODEL_FILES if not is_there(file)]:

@@ -172,7 +172,6 @@ def test_impossible_options(tmp_path: Path, mt, words: list[str], reason: str) -
 def test_models_that_are_not_there_are_fetched_by_a_command(
     tmp_path: Path, mt, monkeypatch
 ) -> None:
-    pytest.importorskip("ai_edge_litert")
     monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "cache"))
     Image.fromarray(somebody()).save(tmp_path / "me.png")
     outcome = mt("iuv", tmp_path / "me.png", "-o", tmp_path / "iuv.png")

@@ -15,7 +15,6 @@ from skimage import data
 
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.models import MODEL_FILES, find_model
-from motion_transfer.extras import require_extra
 from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.training.iuv.trainer import OTHER_SIDE, score_iuv
 from nhrr_core.parts import PART_NAMES
@@ -31,7 +30,6 @@ MAN = (slice(170, 460), slice(170, 290))
 def models() -> None:
     """BlazePose's files are fetched once a machine."""
     try:
-        require_extra("estimate")
         for file in MODEL_FILES:
             find_model(file)
     except InputError as error:

@@ -251,7 +251,6 @@ def test_a_missing_photo_is_told_before_the_driver_is_looked_at(
 def test_models_that_are_not_there_are_fetched_by_a_command(
     tmp_path: Path, draft: Callable, monkeypatch, studio
 ) -> None:
-    pytest.importorskip("ai_edge_litert")
     monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "cache"))
     photo = tmp_path / "alone.png"
     Image.fromarray(ground("coffee")).save(photo)

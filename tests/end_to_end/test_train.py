@@ -16,7 +16,6 @@ from safetensors.torch import load_file
 
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.models import MODEL_FILES, find_model
-from motion_transfer.extras import require_extra
 from motion_transfer.weights.checkpoint import inspect_checkpoint
 
 pytest.importorskip("accelerate", reason="needs the `train` extra")
@@ -211,7 +210,6 @@ def test_synthetic_people(studio, mt, body_model) -> None:
 def blazepose() -> None:
     """BlazePose's files are fetched once a machine."""
     try:
-        require_extra("estimate")
         for file in MODEL_FILES:
             find_model(file)
     except InputError as error:

@@ -3,21 +3,24 @@ this project paints their IUV from landmarks and mask."""
 
 from __future__ import annotations
 
+from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-import torch
 from jaxtyping import Float32, UInt8
 
 from motion_transfer.drawing.person import Box
 from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
-from motion_transfer.estimate.interface import PersonEstimate, check_frame
-from motion_transfer.estimate.iuv.features import MASK_SIZE, body_input, body_window
-from motion_transfer.estimate.iuv.network import IuvNetwork, load_shipped, shipped_file
+from motion_transfer.estimate.inference import CpuNetwork
+from motion_transfer.estimate.interface import Finish, PersonEstimate, check_frame
+from motion_transfer.estimate.iuv.body import MASK_SIZE, body_arrays, body_window
+from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
+from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
 from motion_transfer.estimate.models import MODEL_FILES, digest
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
@@ -27,33 +30,29 @@ SOLID = 0.5  # of the mask; what the painting network's window is laid around
 
 
 class BlazePoseEstimator:
-    """What turns frames into people; one object serves one thread, and one shot after another.
+    """What turns frames into people, one shot after another; frames come from one thread at a time.
 
     Args:
-        network: Paints IUV; None means the weights that ship.
+        weights: Of the network that paints IUV; None means those that ship.
         most_people: How many are followed at once.
         smooth: Whether to smooth landmarks between frames; for photos that have nothing to do with
             each other call `start_shot` before each, or turn it off.
         frame_rate: Frames per second, for smoothing.
-        threads: Of each of BlazePose's networks; the painting network uses torch's.
         fit: Gives everybody other proportions, before their IUV is painted.
-    Raises: InputError where the models or their package are missing; WeightsError.
+    Raises: InputError where the models are missing; WeightsError.
     """
 
     def __init__(
         self,
         *,
-        network: IuvNetwork | None = None,
+        weights: Path | None = None,
         most_people: int = 4,
         smooth: bool = True,
         frame_rate: float = 30.0,
-        threads: int = 1,
         fit: BodyFit | None = None,
     ) -> None:
-        self._tracker = BodyTracker(
-            most_people=most_people, smooth=smooth, frame_rate=frame_rate, threads=threads
-        )
-        self._network = network.fused() if network else load_shipped()
+        self._tracker = BodyTracker(most_people=most_people, smooth=smooth, frame_rate=frame_rate)
+        self._network = CpuNetwork(build_graph(weights)) if weights else _open_shipped()
         self._fit = fit
 
     def start_shot(self) -> None:
@@ -65,9 +64,21 @@ class BlazePoseEstimator:
 
         Raises: InputError if the frame is no RGB picture.
         """
+        return self.locate(frame)()
+
+    def locate(self, frame: UInt8[np.ndarray, "H W 3"]) -> Finish:
+        """Find where the people of the next frame are, and leave it to others to paint their IUV.
+
+        Raises: InputError if the frame is no RGB picture.
+        """
         check_frame(frame)
         seen = self._tracker.follow(np.ascontiguousarray(frame))
-        people = [self._paint(number, body, *frame.shape[:2]) for number, body in seen]
+        return partial(self._finish, seen, *frame.shape[:2])
+
+    def _finish(
+        self, seen: list[tuple[int, SeenBody]], height: int, width: int
+    ) -> list[PersonEstimate]:
+        people = (self._paint(number, body, height, width) for number, body in seen)
         return [person for person in people if person is not None]
 
     def _paint(self, number: int, body: SeenBody, height: int, width: int) -> PersonEstimate | None:
@@ -79,17 +90,21 @@ class BlazePoseEstimator:
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
         # the network shrinks the mask to its own size: no need to see it much finer
         mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
-        with torch.inference_mode():
-            logits = self._network(body_input(body.landmarks, mask, window))
-            iuv = paint_iuv(logits, window, box)
+        (painted,) = self._network.run(*body_arrays(body.landmarks, mask, window))
         return PersonEstimate(
             track=number,
             box=box,
-            iuv=iuv,
+            iuv=paint_iuv(*read_painted(painted), window, box),
             alpha=body.region.paste(np.rint(body.mask * 255).astype(np.uint8), box),
             confidence=body.presence,
             landmarks=body.landmarks,
         )
+
+
+@cache
+def _open_shipped() -> CpuNetwork:
+    """Open the network that paints IUV, once for the whole process. Raises: WeightsError."""
+    return CpuNetwork(build_graph(find_shipped()))
 
 
 def model_facts(_model: None = None) -> dict[str, Any]:
@@ -103,10 +118,10 @@ def model_facts(_model: None = None) -> dict[str, Any]:
 
 def _box_on_frame(body: SeenBody, height: int, width: int, level: float) -> Box | None:
     """Find the box of the frame that holds what a body's mask covers; None if that is nothing."""
-    rows, columns = np.nonzero(body.mask > level)
-    if not len(rows):
+    left, top, across, down = cv2.boundingRect((body.mask > level).view(np.uint8))
+    if not across:
         return None
-    ends = np.array([[columns.min(), rows.min()], [columns.max() + 1, rows.max() + 1]], np.float32)
+    ends = np.array([[left, top], [left + across, top + down]], np.float32)
     # all four corners, as the region may be turned
     corners = np.array([[x, y] for x in ends[:, 0] for y in ends[:, 1]], np.float32)
     on_frame = body.region.to_frame(corners / body.mask.shape[0])

@@ -1,4 +1,4 @@
-"""BlazePose's two networks, TensorFlow Lite models run on the CPU: the detector and the landmarks.
+"""BlazePose's two networks: the detector, and the landmarks.
 
 The detector looks at 224 x 224 pixels of a frame and says for each of 2,254 anchors whether
 somebody's face and trunk are there, where, and how large the circle around the whole body is. The
@@ -18,11 +18,9 @@ import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from motion_transfer.errors import InputError
 from motion_transfer.estimate.blazepose.region import Region
+from motion_transfer.estimate.inference import open_network
 from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
-from motion_transfer.extras import require_extra
-from motion_transfer.media.quiet import quiet_libraries
 
 DETECTOR_SIZE = 224
 STRIDES = (8, 16, 32, 32, 32)
@@ -35,35 +33,6 @@ LANDMARKS_SIZE = 256
 LEAST_PRESENCE = 0.5  # a smaller chance that a body is there means that there is none
 REFINED_RADIUS = 3  # cells: a landmark is refined by its heat map's 7 x 7 cells around it,
 REFINED_FROM = 0.5  # where one of them is at least this hot
-
-
-class LiteModel:
-    """A model with one input; keeps its own buffers, so that one object serves one thread.
-
-    Raises: InputError if the file is no such model, or the package that runs it is missing.
-    """
-
-    def __init__(self, path: Path, threads: int) -> None:
-        require_extra("estimate")
-        from ai_edge_litert.interpreter import Interpreter
-
-        try:
-            with quiet_libraries():  # the run-time remarks on its kernels
-                self._interpreter = Interpreter(model_path=str(path), num_threads=threads)
-                self._interpreter.allocate_tensors()
-        except (ValueError, RuntimeError) as error:
-            raise InputError(
-                f"{path} is not a model that can be run ({error}); `mt models fetch --force`"
-                " fetches it anew"
-            ) from error
-        self._input = self._interpreter.get_input_details()[0]["index"]
-        self._outputs = self._interpreter.get_output_details()
-
-    def run(self, image: Float32[np.ndarray, "H W 3"]) -> list[np.ndarray]:
-        """Compute the outputs in the model's order, without their first axis (a batch of one)."""
-        self._interpreter.set_tensor(self._input, image[None])
-        self._interpreter.invoke()
-        return [self._interpreter.get_tensor(output["index"])[0] for output in self._outputs]
 
 
 @dataclass(frozen=True)
@@ -80,10 +49,10 @@ class Detection:
 
 
 class PersonDetector:
-    """The detector; one object serves one thread."""
+    """The detector."""
 
-    def __init__(self, model: Path, threads: int = 1) -> None:
-        self._model = LiteModel(model, threads)
+    def __init__(self, model: Path) -> None:
+        self._network = open_network(model)
 
     def detect(
         self,
@@ -98,9 +67,9 @@ class PersonDetector:
         height, width = frame.shape[:2]
         region = region or Region(width / 2, height / 2, max(height, width))
         seen = region.cut(frame, DETECTOR_SIZE, border=cv2.BORDER_CONSTANT)
-        raw, logits = self._model.run(seen.astype(np.float32) / 127.5 - 1)
+        raw, logits = self._network.run(seen[None].astype(np.float32) / 127.5 - 1)
         found = []
-        for score, points in merge_overlapping(*decode(raw, logits[:, 0], least_score)):
+        for score, points in merge_overlapping(*decode(raw[0], logits[0, :, 0], least_score)):
             found.append(Detection(score, Region.around_body(*region.to_frame(points[2:4]))))
         return found
 
@@ -184,10 +153,10 @@ class SeenBody:
 
 
 class LandmarkModel:
-    """The landmark model; one object serves one thread."""
+    """The landmark model."""
 
-    def __init__(self, model: Path, threads: int = 1) -> None:
-        self._model = LiteModel(model, threads)
+    def __init__(self, model: Path) -> None:
+        self._network = open_network(model)
 
     def locate(self, frame: UInt8[np.ndarray, "H W 3"], region: Region) -> SeenBody | None:
         """Find the body in a region of the frame; None where there is none.
@@ -198,7 +167,8 @@ class LandmarkModel:
         if not region.is_usable:
             return None
         seen = region.cut(frame, LANDMARKS_SIZE, border=cv2.BORDER_REPLICATE)
-        points, presence, mask, heat, world = self._model.run(seen.astype(np.float32) / 255)
+        outputs = self._network.run(seen[None].astype(np.float32) / 255)
+        points, presence, mask, heat, world = (output[0] for output in outputs)
         if (chance := float(presence[0])) < LEAST_PRESENCE:
             return None
         rows = points.reshape(-1, 5)  # x, y, depth, and two chances
@@ -228,22 +198,19 @@ def refine(
         heat: Logits, one map for each point.
     """
     height, width, _ = heat.shape
+    centres = (places * (width, height)).astype(np.int64)  # column and row, towards zero
+    steps = np.arange(-REFINED_RADIUS, REFINED_RADIUS + 1)
+    rows, columns = centres[:, 1, None, None] + steps[:, None], centres[:, 0, None, None] + steps
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    index = np.arange(len(places))[:, None, None]
+    near = _sigmoid(heat[rows.clip(0, height - 1), columns.clip(0, width - 1), index]) * inside
+    total = near.sum((1, 2))
+    is_hot = ((centres >= 0) & (centres < (width, height))).all(1)
+    is_hot &= near.max((1, 2)) >= REFINED_FROM
     refined = places.copy()
-    for index, (x, y) in enumerate(places):
-        column, row = int(x * width), int(y * height)
-        if not (0 <= column < width and 0 <= row < height):
-            continue
-        top, left = max(0, row - REFINED_RADIUS), max(0, column - REFINED_RADIUS)
-        near = heat[top : row + REFINED_RADIUS + 1, left : column + REFINED_RADIUS + 1, index]
-        near = _sigmoid(near)
-        if near.max() < REFINED_FROM:
-            continue
-        rows, columns = np.indices(near.shape)
-        total = near.sum()
-        refined[index] = (
-            (near * (columns + left)).sum() / total / width,
-            (near * (rows + top)).sum() / total / height,
-        )
+    for axis, cells, count in ((0, columns, width), (1, rows, height)):
+        middle = (near * cells).sum((1, 2))
+        np.divide(middle, total * count, out=refined[:, axis], where=is_hot)
     return refined
 
 

@@ -43,9 +43,8 @@ class BodyTracker:
         most_people: How many are followed at once; the most certain ones.
         smooth: Whether to smooth the landmarks between frames.
         frame_rate: Frames per second, for smoothing.
-        threads: Of each network.
         second_looks: At somebody new; MediaPipe's own tracker has none.
-    Raises: InputError where the models or the package that runs them are missing.
+    Raises: InputError where the models are missing.
     """
 
     def __init__(
@@ -54,11 +53,10 @@ class BodyTracker:
         most_people: int = 4,
         smooth: bool = True,
         frame_rate: float = 30.0,
-        threads: int = 1,
         second_looks: int = SECOND_LOOKS,
     ) -> None:
-        self._detector = PersonDetector(find_model(DETECTOR), threads)
-        self._landmarker = LandmarkModel(find_model(LANDMARKER), threads)
+        self._detector = PersonDetector(find_model(DETECTOR))
+        self._landmarker = LandmarkModel(find_model(LANDMARKER))
         self._most_people, self._smooth = most_people, smooth
         self._second_looks = second_looks
         self._seconds = 1 / frame_rate

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,48 +21,19 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from motion_transfer.errors import InputError, WeightsError
-from motion_transfer.estimate.iuv.features import (
-    GRID,
-    MAP_CHANNELS,
-    VECTOR_LENGTH,
-    BodyInput,
-    feature_maps,
-    feature_vector,
+from motion_transfer.estimate.iuv.body import GRID, MAP_CHANNELS, VECTOR_LENGTH
+from motion_transfer.estimate.iuv.features import BodyInput, feature_maps, feature_vector
+from motion_transfer.estimate.iuv.weights import (
+    FINER,
+    PARTS,
+    WHAT,
+    IuvNetworkConfig,
+    read_config,
 )
-from motion_transfer.media.structured import parse_json
 from motion_transfer.weights.tensors import load_network, read_header
 from nhrr_core.parts import PART_COUNT
 
-PARTS = PART_COUNT + 1  # and the background
-FINER = 2  # output pixels a cell and side
 OUTPUT_SIZE = GRID * FINER
-MOST_LEVELS = 7  # the last one is a single cell
-WIDEST = 4096
-SHIPPED = "iuv_network.safetensors"
-
-
-@dataclass(frozen=True)
-class IuvNetworkConfig:
-    """The network's sizes.
-
-    Attributes:
-        widths: Channels from the finest level (64 x 64) to the coarsest (8 x 8).
-        code: How many numbers the row of landmarks is condensed to.
-    """
-
-    widths: tuple[int, ...] = (32, 56, 96, 144)
-    code: int = 128
-
-    def __post_init__(self) -> None:
-        """Raises: ValueError for sizes that no network has."""
-        sizes = (*self.widths, self.code)
-        if not 1 <= len(self.widths) <= MOST_LEVELS or not all(
-            type(size) is int and 1 <= size <= WIDEST for size in sizes
-        ):
-            raise ValueError(
-                f"1 to {MOST_LEVELS} widths and a code from 1 to {WIDEST}, not {sizes[:9]}"
-            )
 
 
 class IuvLogits(NamedTuple):
@@ -181,36 +152,8 @@ def load_weights(path: Path) -> IuvNetwork:
 
     Raises: WeightsError if the file is missing, damaged, or another network's.
     """
-    what = "weights of the IUV network in"
-    header = read_header(path, what)
-    try:
-        values = parse_json(header.metadata["config"], "config")
-        config = IuvNetworkConfig(widths=tuple(values.pop("widths")), **values)
-    except (InputError, AttributeError, KeyError, TypeError, ValueError) as error:
-        raise WeightsError(
-            f"{path} holds no weights of the IUV network ({type(error).__name__}: {error});"
-            " give a file written by `mt train iuv fit`"
-        ) from error
+    header = read_header(path, WHAT)
+    config = read_config(header.metadata, path)
     # into float32, from the half precision of the file
-    network = load_network(lambda: IuvNetwork(config), header.state, path, what)
+    network = load_network(lambda: IuvNetwork(config), header.state, path, WHAT)
     return network.fused().requires_grad_(False)
-
-
-def shipped_file() -> Path:
-    """Name the file of the weights that come with the package."""
-    return Path(__file__).parents[1] / SHIPPED
-
-
-def has_shipped() -> bool:
-    """Tell whether weights came with the package."""
-    return shipped_file().is_file()
-
-
-def load_shipped() -> IuvNetwork:
-    """Load the weights that come with the package. Raises: WeightsError."""
-    if not has_shipped():
-        raise WeightsError(
-            f"this installation lacks {SHIPPED}, the weights with which the blazepose estimator"
-            " paints IUV; choose the densepose estimator with a model of yours, or give IUV"
-        )
-    return load_weights(shipped_file())

@@ -2,77 +2,131 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
-import torch
-from jaxtyping import Float, Float32, Int, UInt8
-from torch import Tensor
+from jaxtyping import Float32, Int64, UInt8
 
 from motion_transfer.drawing.person import Box
-from motion_transfer.estimate.iuv.network import IuvLogits
 
 FINEST = 768
 """Larger windows are painted at this size, px, and enlarged: memory stays bounded, and 128 x 128
 logits hold no finer borders."""
 
 
-def paint_iuv(logits: IuvLogits, window: Box, box: Box) -> UInt8[np.ndarray, "h w 3"]:
-    """Paint IUV on a box of the frame, from the logits of one person (B = 1) in a window.
+def paint_iuv(
+    parts: Float32[np.ndarray, "25 n n"], uv: Float32[np.ndarray, "24 2 n n"], window: Box, box: Box
+) -> UInt8[np.ndarray, "h w 3"]:
+    """Paint IUV on a box of the frame, from what the network says of one person in a window.
 
     Parts are decided after enlarging their logits, so that borders are smooth; U and V are
     interpolated within each part and never across a border. Where the box reaches beyond the
     window, nobody is.
+
+    Args:
+        parts, uv: As in `IuvLogits`.
     """
+    painted = np.zeros((box.height, box.width, 3), np.uint8)
     size = min(window.width, FINEST)
-    parts = enlarge_parts(logits.parts[0].numpy(), size)
-    rows, columns = torch.nonzero(torch.from_numpy(parts), as_tuple=True)
-    which = torch.from_numpy(parts)[rows, columns].long()
-    # a border of nobody around it, for pixels beyond the window
-    iuv = np.zeros((size + 2, size + 2, 3), np.uint8)
-    uv = interpolate_within(logits.uv[0], which - 1, rows, columns, size)
-    values = torch.cat([which[:, None], (uv.clamp(0, 1) * 255).round().long()], 1)
-    iuv[rows.numpy() + 1, columns.numpy() + 1] = values.to(torch.uint8).numpy()
-    spans = (box.top, box.bottom, window.top), (box.left, box.right, window.left)
-    nearest = [
-        np.floor((np.arange(first, last) + 0.5 - start) * (size / window.width)).astype(int) + 1
-        for first, last, start in spans
-    ]
-    return iuv[nearest[0].clip(0, size + 1)[:, None], nearest[1].clip(0, size + 1)]
+    axis = _Axis.over(parts.shape[-1], size)
+    x, y, width, height = cv2.boundingRect((parts[1:].max(0) > parts[0]).view(np.uint8))
+    rows, columns = axis.among(y - 1, height + 1), axis.among(x - 1, width + 1)
+    down, across = axis.cut(rows), axis.cut(columns)
+    if not (len(down.low) and len(across.low)):
+        return painted
+    (best,) = _enlarge([parts[0]], down, across)
+    which = np.zeros(best.shape, np.uint8)
+    places = [np.zeros(best.shape, np.float32) for _ in range(2)]
+    top, left = down.low[0], across.low[0]
+    likely = _may_win(parts[:, top : down.low[-1] + 2, left : across.low[-1] + 2])
+    for part, where in enumerate(likely[1:], 1):
+        x, y, width, height = cv2.boundingRect(where)
+        here = down.among(top + y, height), across.among(left + x, width)
+        planes = (parts[part], *uv[part - 1])
+        logit, *own = _enlarge(planes, down.cut(here[0]), across.cut(here[1]))
+        wins = logit > best[here]
+        np.copyto(best[here], logit, where=wins)
+        np.copyto(which[here], np.uint8(part), where=wins)
+        for place, value in zip(places, own, strict=True):
+            np.copyto(place[here], value, where=wins)
+    # rounds, and keeps to 255
+    levels = [cv2.convertScaleAbs(place.clip(min=0), alpha=255) for place in places]
+    # the nearest painted pixel of each of the box's
+    ways = (box.top, box.bottom, window.top, rows), (box.left, box.right, window.left, columns)
+    (to_rows, from_rows), (to_columns, from_columns) = (
+        _nearest(first, stop, start, size / window.width, span) for first, stop, start, span in ways
+    )
+    for channel, plane in enumerate((which, *levels)):
+        painted[to_rows, to_columns, channel] = plane[from_rows].take(from_columns, axis=1)
+    return painted
 
 
-def enlarge_parts(
-    logits: Float32[np.ndarray, "25 h w"], size: int
-) -> UInt8[np.ndarray, "size size"]:
-    """Find the part with the highest logit at each pixel of a size x size picture."""
-    # one part after the other: an argmax over a stack of enlarged ones reads across its planes,
-    # which is slower, and the stack takes memory
-    best = cv2.resize(logits[0], (size, size), interpolation=cv2.INTER_LINEAR)
-    parts = np.zeros((size, size), np.uint8)
-    for part, plane in enumerate(logits[1:], 1):
-        enlarged = cv2.resize(plane, (size, size), interpolation=cv2.INTER_LINEAR)
-        np.copyto(parts, np.uint8(part), where=enlarged > best)
-        cv2.max(best, enlarged, dst=best)
-    return parts
+@dataclass(frozen=True)
+class _Axis:
+    """Pixels of an enlarged picture along one axis.
 
-
-def interpolate_within(
-    uv: Float[Tensor, "24 2 h w"],
-    chart: Int[Tensor, " N"],
-    rows: Int[Tensor, " N"],
-    columns: Int[Tensor, " N"],
-    size: int,
-) -> Float[Tensor, "N 2"]:
-    """Look up U and V of one chart each at pixels of a size x size picture.
-
-    Bilinear between the low resolution's pixel centres, clamped at the edge.
+    Attributes:
+        low: The small picture's pixel whose centre lies before each, or at it; never the last one.
+        share: How far it is from there to the next one, 0..1.
     """
-    height, width = uv.shape[-2:]
-    y = ((rows + 0.5) * (height / size) - 0.5).clamp(0, height - 1)
-    x = ((columns + 0.5) * (width / size) - 0.5).clamp(0, width - 1)
-    top, left = y.long().clamp_max(height - 2), x.long().clamp_max(width - 2)
-    down, right = (y - top)[:, None], (x - left)[:, None]
-    table = uv.permute(0, 2, 3, 1).reshape(-1, 2)
-    first = (chart * height + top) * width + left
-    above = torch.lerp(table[first], table[first + 1], right)
-    below = torch.lerp(table[first + width], table[first + width + 1], right)
-    return torch.lerp(above, below, down)
+
+    low: Int64[np.ndarray, " N"]
+    share: Float32[np.ndarray, " N"]
+
+    @classmethod
+    def over(cls, count: int, size: int) -> _Axis:
+        """Lay `size` pixels over `count`, clamped at the edges."""
+        place = ((np.arange(size) + 0.5) * (count / size) - 0.5).clip(0, count - 1)
+        low = np.minimum(place.astype(np.int64), count - 2)
+        return cls(low, (place - low).astype(np.float32))
+
+    def among(self, first: int, count: int) -> slice:
+        """Find those that lie between `first` and the `count` pixels behind it."""
+        start, stop = np.searchsorted(self.low, [first, first + count])
+        return slice(int(start), int(stop))
+
+    def cut(self, span: slice) -> _Axis:
+        """Take some of the pixels."""
+        return _Axis(self.low[span], self.share[span])
+
+
+def _may_win(logits: Float32[np.ndarray, "25 h w"]) -> UInt8[np.ndarray, "25 h-1 w-1"]:
+    """Tell between which four pixels each part may have the highest logit: a bilinear sample lies
+    between the lowest and the highest of them, and must not be below another part's lowest."""
+    corners = [logits[:, y : y - 1 or None, x : x - 1 or None] for y in (0, 1) for x in (0, 1)]
+    surely = np.minimum.reduce(corners).max(0)
+    return (np.maximum.reduce(corners) >= surely).view(np.uint8)
+
+
+def _enlarge(
+    planes: Sequence[Float32[np.ndarray, "n n"]], down: _Axis, across: _Axis
+) -> Float32[np.ndarray, "K H W"]:
+    """Sample small pictures bilinearly at the pixels of two axes."""
+    if not (len(down.low) and len(across.low)):
+        return np.zeros((len(planes), len(down.low), len(across.low)), np.float32)
+    top, end = down.low[0], down.low[-1] + 2
+    near = np.stack([plane[top:end] for plane in planes])
+    wide = _between(near, across.low, across.share, 2)
+    return _between(wide, down.low - top, down.share[:, None], 1)
+
+
+def _between(
+    values: Float32[np.ndarray, "K h w"], low: Int64[np.ndarray, " N"], share: np.ndarray, axis: int
+) -> Float32[np.ndarray, "K H W"]:
+    first = values.take(low, axis)
+    change = values.take(low + 1, axis)
+    change -= first
+    change *= share
+    return np.add(first, change, out=change)
+
+
+def _nearest(
+    first: int, stop: int, start: int, scale: float, span: slice
+) -> tuple[slice, Int64[np.ndarray, " N"]]:
+    """Tell which of the pixels `first` to `stop` of a frame lie in a span of a picture that begins
+    at `start`, a frame's pixel being `scale` of its; and where in the span."""
+    place = np.floor((np.arange(first, stop) + 0.5 - start) * scale).astype(np.int64) - span.start
+    begins, ends = np.searchsorted(place, [0, span.stop - span.start])
+    return slice(int(begins), int(ends)), place[begins:ends]

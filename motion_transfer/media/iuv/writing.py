@@ -10,9 +10,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import av
+import cv2
 import numpy as np
 from jaxtyping import UInt8
 
@@ -113,14 +114,21 @@ def write_iuv(
             write_alpha = (
                 opened.enter_context(FORMS[suffix](alpha, settings, ())) if settings.alpha else None
             )
-            for frame in _counted(frames, settings):
+            for frame in map(np.ascontiguousarray, _counted(frames, settings)):
                 if write_alpha:
-                    write_alpha(np.ascontiguousarray(frame[..., 3]))
-                write(np.ascontiguousarray(frame[..., 2::-1] if swapped else frame[..., :3]))
+                    write_alpha(cv2.extractChannel(frame, 3))
+                write(_colours(frame, swapped=swapped))
                 done(1)
         if settings.alpha:
             publish(alpha, name_alpha(output))
         publish(finished, output)
+
+
+def _colours(frame: Frame, *, swapped: bool) -> Plane:
+    """Take (I, U, V) of a frame, or (V, U, I); NumPy alone would take several times as long."""
+    if frame.shape[2] == 4:
+        return cv2.cvtColor(frame, cv2.COLOR_RGBA2BGR if swapped else cv2.COLOR_RGBA2RGB)
+    return cv2.cvtColor(frame, cv2.COLOR_RGB2BGR) if swapped else frame
 
 
 def _counted(frames: Iterable[Frame], settings: IuvOutput) -> Iterator[Frame]:
@@ -151,7 +159,8 @@ def _open_png(path: Path, _settings: IuvOutput, _channels: tuple[int, ...]) -> I
 @contextmanager
 def _open_video(path: Path, settings: IuvOutput, channels: tuple[int, ...]) -> Iterator[Write]:
     codec = CODECS[LOSSLESS]
-    given, stored = ("rgb24", codec.pixel_format) if channels else ("gray", "gray")
+    stored = codec.pixel_format if channels else "gray"
+    assert stored in ("bgr0", "gray")
     # or Matroska marks its segments with random numbers, and no two files are alike
     with open_output(path, options={"fflags": "+bitexact"}) as container:
         rate = settings.frame_rate or VIDEO_RATE
@@ -161,8 +170,15 @@ def _open_video(path: Path, settings: IuvOutput, channels: tuple[int, ...]) -> I
         stream.codec_context.thread_count = 1  # FFV1's bytes depend on the number of threads
 
         def write(plane: Plane) -> None:
-            picture = av.VideoFrame.from_ndarray(plane, format=given)
-            container.mux(stream.encode(picture.reformat(format=stored)))
+            picture = av.VideoFrame(settings.width, settings.height, stored)
+            place: Any = picture.planes[0]  # a buffer, which its type does not tell
+            memory = np.frombuffer(place, np.uint8)  # rows may be longer than needed
+            if channels:
+                pixels = memory.reshape(settings.height, -1, 4)[:, : settings.width]
+                cv2.cvtColor(plane, cv2.COLOR_RGB2BGRA, dst=pixels)  # FFmpeg would be slower
+            else:
+                memory.reshape(settings.height, -1)[:, : settings.width] = plane
+            container.mux(stream.encode(picture))
 
         yield write
         container.mux(stream.encode(None))

@@ -14,7 +14,8 @@ from jaxtyping import Float32, UInt8
 
 from motion_transfer.drawing.person import Box
 from motion_transfer.estimate.interface import LANDMARK_COUNT, LANDMARK_NAMES, Landmarks
-from motion_transfer.estimate.iuv.features import MASK_SIZE, BodyInput, body_input, body_window
+from motion_transfer.estimate.iuv.body import MASK_SIZE, body_window
+from motion_transfer.estimate.iuv.features import BodyInput, body_input
 from motion_transfer.estimate.iuv.network import OUTPUT_SIZE
 from motion_transfer.training.iuv.samples import Sample
 

@@ -104,8 +104,7 @@ def make_samples(options: SampleOptions, done: Callable[[int], object] = int) ->
     Raises: InputError where an extra or the models are missing; OutputError where the folder
         holds something else or cannot be written.
     """
-    for extra in ("people", "estimate"):  # workers could only say that they broke
-        require_extra(extra)
+    require_extra("people")  # workers could only say that they broke
     for file in MODEL_FILES:
         find_model(file)
     with explain_disk_errors(options.out):

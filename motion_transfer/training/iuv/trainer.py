@@ -267,4 +267,5 @@ def score_samples(files: list[Path], network: IuvNetwork) -> Iterator[IuvScore]:
         if pair := training_pair(read_sample(file), NOTHING, rng):
             square = Box(0, 0, OUTPUT_SIZE, OUTPUT_SIZE)
             with torch.inference_mode():
-                yield score_iuv(paint_iuv(network(pair[0]), square, square), pair[1])
+                parts, uv = (logits[0].numpy() for logits in network(pair[0]))
+            yield score_iuv(paint_iuv(parts, uv, square, square), pair[1])

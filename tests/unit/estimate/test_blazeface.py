@@ -12,7 +12,6 @@ import pytest
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.blazeface import FACE_SIZE, FaceDetector, anchor_centres
 from motion_transfer.estimate.models import FACE_DETECTOR, find_model
-from motion_transfer.extras import require_extra
 from motion_transfer.media.pictures.photo import read_photo
 
 ASTRONAUT = Path(str(files("motion_transfer.demo") / "astronaut.jpg"))
@@ -31,7 +30,6 @@ def test_anchors_cover_the_picture() -> None:
 @pytest.fixture(scope="module")
 def detector() -> FaceDetector:
     try:
-        require_extra("estimate")
         return FaceDetector(find_model(FACE_DETECTOR))
     except InputError as error:
         pytest.skip(str(error))

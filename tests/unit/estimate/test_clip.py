@@ -2,45 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pytest
-from estimate_stubs import BLUE, GREEN, RED, RectangleEstimator, scene
+from estimate_stubs import BLUE, COLOURS, GREEN, RED, FramesInMemory, RectangleEstimator, scene
 from skimage import data
 
 from motion_transfer.drawing.person import Box, Follower, choose_box, find_people
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.clip import ClipSummary, estimate_clip, lay_iuv
-from motion_transfer.media.pictures.stream import PictureStream
+from motion_transfer.estimate.interface import PersonEstimate
 
 LEFT, RIGHT = Box(5, 10, 20, 50), Box(40, 5, 65, 55)
 EMPTY = scene()
 
 
-class Frames(PictureStream):
-    """Frames from memory."""
-
-    def __init__(self, frames: list[np.ndarray]) -> None:
-        super().__init__(Path("clip"), len(frames), *frames[0].shape[:2])
-        self._frames = frames
-        self.taken = 0
-
-    def read(self) -> Iterator[np.ndarray]:
-        for frame in self._frames:
-            self.taken += 1
-            yield frame
-
-    def where(self, index: int) -> str:
-        return f"frame {index}"
-
-
 def parts(frames: list[np.ndarray], **options) -> tuple[list[set[int]], ClipSummary]:
     """The parts in each frame; the stub's people are parts 2 (red), 3 (green) and 4 (blue)."""
     summary = ClipSummary()
-    iuv = estimate_clip(Frames(frames), RectangleEstimator(), summary=summary, **options)
+    iuv = estimate_clip(FramesInMemory(frames), RectangleEstimator(), summary=summary, **options)
     return [set(np.unique(frame[..., 0])) - {0} for frame in iuv], summary
 
 
@@ -51,6 +34,33 @@ def test_every_frame_is_estimated_and_counted() -> None:
     assert (summary.frame_count, summary.most_people) == (4, 2)
     assert summary.empty == [(2, 3)]
     assert summary.shots == [0]
+
+
+class StagedRectangles(RectangleEstimator):
+    """Looks at frames one after the other, and at what is in them whenever it is asked to."""
+
+    def locate(self, frame: np.ndarray) -> Callable[[], list[PersonEstimate]]:
+        self.located = [*getattr(self, "located", []), int(frame[0, 0, 0])]
+
+        def finish() -> list[PersonEstimate]:
+            time.sleep(0.01 * (frame[0, 0, 0] % 3))  # later frames are finished first
+            return self.estimate(frame)
+
+        return finish
+
+
+def test_frames_finished_out_of_order_come_in_order() -> None:
+    frames = [
+        scene((COLOURS[index % 3], Box(5 + index, 10, 20 + index, 50)), ground=90 + index)
+        for index in range(9)
+    ]
+    estimator = StagedRectangles()
+    seen = list(estimate_clip(FramesInMemory(frames), estimator))
+    assert estimator.located == list(range(90, 99))
+    for one, other in zip(
+        seen, estimate_clip(FramesInMemory(frames), RectangleEstimator()), strict=True
+    ):
+        assert np.array_equal(one, other)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +95,7 @@ def test_a_cut_starts_a_shot() -> None:
     for frame in frames:
         frame[LEFT.slices] = RED
     summary = ClipSummary()
-    assert len(list(estimate_clip(Frames(frames), estimator, summary=summary))) == 10
+    assert len(list(estimate_clip(FramesInMemory(frames), estimator, summary=summary))) == 10
     assert summary.shots == [0, 5]
     assert estimator.shots == 2
 
@@ -155,7 +165,7 @@ def test_choices_by_size_order_and_place() -> None:
 
 
 def test_a_clip_that_is_not_read_to_its_end_is_let_go() -> None:
-    clip = Frames([scene((RED, LEFT))] * 200)
+    clip = FramesInMemory([scene((RED, LEFT))] * 200)
     with closing(estimate_clip(clip, RectangleEstimator())) as frames:
         next(frames)
     assert clip.taken < 30

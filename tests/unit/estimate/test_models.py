@@ -166,13 +166,11 @@ def test_the_command(mt, cache: Path, tmp_path: Path) -> None:
 
 
 def test_info_tells_whether_they_are_there(mt, monkeypatch, tmp_path: Path) -> None:
-    pytest.importorskip("ai_edge_litert")
     monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path))
     assert "mt models fetch" in mt("info").out
 
 
 def test_info_tells_that_the_iuv_network_is_missing(mt, monkeypatch) -> None:
-    pytest.importorskip("ai_edge_litert")
     monkeypatch.setattr("motion_transfer.render.about._describe_shipped", str)
     monkeypatch.setattr("motion_transfer.render.about.has_shipped", lambda: False)
     assert "iuv_network.safetensors is missing" in mt("info").out

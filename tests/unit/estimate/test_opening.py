@@ -46,7 +46,7 @@ def test_what_fits_is_not_refused() -> None:
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
 def test_an_estimator_is_opened_by_name(tmp_path: Path) -> None:
     model = write_red_model(tmp_path / "red.pt")
-    assert isinstance(open_estimator("densepose", model, threads=2), DensePoseEstimator)
+    assert isinstance(open_estimator("densepose", model), DensePoseEstimator)
 
 
 def test_facts_tell_which_models_look(tmp_path: Path) -> None:

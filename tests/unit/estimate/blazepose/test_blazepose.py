@@ -8,10 +8,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from estimate_stubs import FramesInMemory
 from skimage import data
 
 from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError
+from motion_transfer.estimate import blazepose, inference
 from motion_transfer.estimate.blazepose import BlazePoseEstimator
 from motion_transfer.estimate.blazepose.networks import (
     LandmarkModel,
@@ -22,8 +24,10 @@ from motion_transfer.estimate.blazepose.networks import (
 )
 from motion_transfer.estimate.blazepose.retarget import BONES, BodyFit
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
+from motion_transfer.estimate.clip import estimate_clip, lay_iuv
 from motion_transfer.estimate.interface import LANDMARK, LANDMARK_NAMES
-from motion_transfer.estimate.iuv.network import IuvNetwork, IuvNetworkConfig
+from motion_transfer.estimate.iuv.network import IuvNetwork, save_weights
+from motion_transfer.estimate.iuv.weights import IuvNetworkConfig
 
 MEDIAN_AWAY, MOST_AWAY = 0.006, 0.05
 """Of the person's height; the farthest are single landmarks whose heat map is at the limit at which
@@ -123,9 +127,16 @@ def test_refining_moves_to_hot_cells_only() -> None:
 
 
 @pytest.fixture(scope="module")
-def estimator(models) -> BlazePoseEstimator:
-    network = IuvNetwork(IuvNetworkConfig(widths=(8, 8, 8, 8), code=8))
-    return BlazePoseEstimator(network=network, most_people=6)
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A network that is quick and paints anything."""
+    file = tmp_path_factory.mktemp("weights") / "small.safetensors"
+    save_weights(file, IuvNetwork(IuvNetworkConfig(widths=(8, 8, 8, 8), code=8)), {})
+    return file
+
+
+@pytest.fixture(scope="module")
+def estimator(models, weights: Path) -> BlazePoseEstimator:
+    return BlazePoseEstimator(weights=weights, most_people=6)
 
 
 def estimate(estimator: BlazePoseEstimator, frame: np.ndarray) -> list:
@@ -220,12 +231,27 @@ def test_somebody_who_leaves_is_lost_and_found_again(estimator) -> None:
     assert again.track > first.track
 
 
-def test_a_fitted_person_has_another_body(models, estimator) -> None:
+def test_a_clip_is_the_same_however_many_cores_there_are(models, monkeypatch) -> None:
+    photo = data.astronaut()
+    frames = [np.ascontiguousarray(np.roll(photo, 3 * index, axis=1)) for index in range(5)]
+    found = []
+    for cores in (1, 2):
+        monkeypatch.setattr("motion_transfer.cores._share", cores)
+        for opened in (inference.open_network, blazepose._open_shipped):
+            opened.cache_clear()
+        clip = FramesInMemory(frames)
+        found.append([frame.tobytes() for frame in estimate_clip(clip, BlazePoseEstimator())])
+    one_by_one = BlazePoseEstimator()
+    iuv = [lay_iuv(one_by_one.estimate(frame), *frame.shape[:2]).tobytes() for frame in frames]
+    assert found == [iuv, iuv]
+    assert len(set(iuv)) == 5
+
+
+def test_a_fitted_person_has_another_body(models, estimator, weights: Path) -> None:
     photo = data.astronaut()
     (before,) = estimate(estimator, photo)
-    network = IuvNetwork(IuvNetworkConfig(widths=(8, 8, 8, 8), code=8))
     fit = BodyFit(dict.fromkeys(BONES, 1.0) | {"head": 0.7})
-    (after,) = BlazePoseEstimator(network=network, fit=fit).estimate(photo)
+    (after,) = BlazePoseEstimator(weights=weights, fit=fit).estimate(photo)
     ears = [LANDMARK["left-ear"], LANDMARK["right-ear"]]
     width = [np.ptp(person.landmarks.image[ears, 0]) for person in (before, after)]
     assert width[1] / width[0] == pytest.approx(0.7, abs=0.02)

@@ -7,34 +7,39 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from estimate_stubs import iuv_logits
 
 from motion_transfer.drawing.person import Box
 from motion_transfer.errors import WeightsError
 from motion_transfer.estimate.interface import LANDMARK, Landmarks
 from motion_transfer.estimate.iuv import features
-from motion_transfer.estimate.iuv.features import (
+from motion_transfer.estimate.iuv.body import (
     BONES,
     GRID,
     MAP_CHANNELS,
     MARGIN,
     VECTOR_LENGTH,
+    body_window,
+)
+from motion_transfer.estimate.iuv.features import (
     BodyInput,
     body_input,
-    body_window,
     feature_maps,
     feature_vector,
 )
 from motion_transfer.estimate.iuv.network import (
-    PARTS,
     IuvNetwork,
-    IuvNetworkConfig,
-    load_shipped,
     load_weights,
     save_weights,
     spread_cells,
 )
-from motion_transfer.estimate.iuv.painting import FINEST, paint_iuv
+from motion_transfer.estimate.iuv.weights import (
+    PARTS,
+    IuvNetworkConfig,
+    find_shipped,
+    list_tensors,
+    read_weights,
+)
+from motion_transfer.weights.tensors import list_entries
 
 SMALL = IuvNetworkConfig(widths=(8, 8, 12, 12), code=8)
 
@@ -142,39 +147,6 @@ def test_training_goes_on_after_estimating(body: BodyInput) -> None:
     assert body.points.grad is not None and body.points.grad.abs().sum() > 0
 
 
-def test_painting_at_the_networks_size_is_what_it_says() -> None:
-    parts = np.random.default_rng(0).integers(0, PARTS, (128, 128))
-    window = Box(5, 7, 133, 135)
-    iuv = paint_iuv(iuv_logits(parts, 0.4), window, window)
-    assert np.array_equal(iuv[..., 0], parts)
-    assert set(np.unique(iuv[parts > 0][:, 1:])) == {102}
-    assert (iuv[parts == 0] == 0).all()
-
-
-@pytest.mark.parametrize("side", [300, FINEST + 500])
-def test_painting_larger_keeps_places(side: int) -> None:
-    parts = np.zeros((128, 128), int)
-    parts[32:96, 40:80] = 2
-    window = Box(-20, -30, side - 20, side - 30)
-    box = Box(0, 0, side, side + 10)  # beyond the window at right and bottom
-    painted = paint_iuv(iuv_logits(parts), window, box)[..., 0] == 2
-    rows, columns = np.flatnonzero(painted.any(1)), np.flatnonzero(painted.any(0))
-    scale = side / 128
-    assert rows[[0, -1]] == pytest.approx([32 * scale - 30, 96 * scale - 30], abs=scale + 2)
-    assert columns[[0, -1]] == pytest.approx([40 * scale - 20, 80 * scale - 20], abs=scale + 2)
-    assert not painted[side - 30 :].any()
-
-
-def test_uv_never_crosses_a_border() -> None:
-    parts = np.zeros((128, 128), int)
-    parts[:, 64:], parts[:, :64] = 1, 2
-    logits = iuv_logits(parts)
-    logits.uv[:, 0], logits.uv[:, 1] = 0.1, 0.9
-    iuv = paint_iuv(logits, Box(0, 0, 500, 500), Box(0, 0, 500, 500))
-    assert set(np.unique(iuv[iuv[..., 0] == 1][:, 1:])) == {26}
-    assert set(np.unique(iuv[iuv[..., 0] == 2][:, 1:])) == {230}
-
-
 def test_weights_go_to_a_file_and_back(tmp_path: Path, body: BodyInput) -> None:
     network = IuvNetwork(SMALL).eval()
     save_weights(tmp_path / "w.safetensors", network, {"trained-on": "nothing"})
@@ -183,16 +155,23 @@ def test_weights_go_to_a_file_and_back(tmp_path: Path, body: BodyInput) -> None:
         torch.testing.assert_close(back.parts, network(body).parts, atol=0.02, rtol=0.02)
 
 
+@pytest.mark.parametrize("widths", [(8,), (8, 9), (32, 56, 96, 144)])
+def test_the_list_of_tensors_is_the_networks(widths: tuple[int, ...]) -> None:
+    config = IuvNetworkConfig(widths=widths, code=7)
+    assert list_tensors(config) == list_entries(IuvNetwork(config).state_dict())
+
+
 @pytest.mark.parametrize("content", [None, b"", b"words"])
 def test_files_that_are_no_weights(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "w.safetensors"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(WeightsError, match=r"weights of the IUV network in .*w\.safetensors"):
-        load_weights(path)
+    for read in (load_weights, read_weights):
+        with pytest.raises(WeightsError, match=r"weights of the IUV network in .*w\.safetensors"):
+            read(path)
 
 
 def test_without_its_weights_it_says_what_else_can_be_done(monkeypatch) -> None:
-    monkeypatch.setattr("motion_transfer.estimate.iuv.network.SHIPPED", "lost.safetensors")
+    monkeypatch.setattr("motion_transfer.estimate.iuv.weights.SHIPPED", "lost.safetensors")
     with pytest.raises(WeightsError, match=r"lacks lost.safetensors, .* densepose estimator"):
-        load_shipped()
+        find_shipped()

@@ -8,14 +8,12 @@ import pytest
 
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.models import MODEL_FILES, find_model
-from motion_transfer.extras import require_extra
 
 
 @pytest.fixture(scope="session")
 def models() -> dict[str, Path]:
     """The two model files by name."""
     try:
-        require_extra("estimate")
         return {file.name: find_model(file) for file in MODEL_FILES}
     except InputError as error:
         pytest.skip(str(error))

@@ -1,0 +1,81 @@
+"""Networks run on the CPU by OpenVINO: files of TensorFlow Lite, and ONNX graphs built here.
+
+An inference takes one thread. However many run side by side, each gives the same bytes as alone.
+"""
+
+from __future__ import annotations
+
+import threading
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import onnx
+import openvino
+
+from motion_transfer.cores import core_count
+from motion_transfer.errors import InputError
+from motion_transfer.media.quiet import quiet_libraries
+
+
+class CpuNetwork:
+    """A network that threads may share; each has buffers of its own.
+
+    Args:
+        model: A file, or a graph.
+    Raises: InputError if the file is no model.
+    """
+
+    def __init__(self, model: Path | onnx.ModelProto) -> None:
+        threads = core_count()
+        settings = {
+            # measured: in bfloat16 landmarks are 2 px off, and joints up to 13
+            "INFERENCE_PRECISION_HINT": "f32",
+            "NUM_STREAMS": threads,  # one thread each: more inferences at the same time take turns
+            "INFERENCE_NUM_THREADS": threads,
+            # or several networks, which know nothing of each other, sit on the same core
+            "ENABLE_CPU_PINNING": False,
+        }
+        core = openvino.Core()
+        try:
+            with quiet_libraries():
+                read = core.read_model(
+                    model if isinstance(model, Path) else model.SerializeToString()
+                )
+                self._compiled = core.compile_model(read, "CPU", settings)
+        except RuntimeError as error:
+            if not isinstance(model, Path):
+                raise
+            raise InputError(
+                f"{model} is not a model that can be run ({_reason(error)}); `mt models fetch"
+                " --force` fetches it anew"
+            ) from error
+        self._own = threading.local()
+
+    def run(self, *inputs: np.ndarray) -> list[np.ndarray]:
+        """Compute the outputs, in the model's order, and as it shapes them.
+
+        The same thread's next call overwrites them.
+
+        Args:
+            inputs: In the model's order, contiguous.
+        """
+        request = getattr(self._own, "request", None)
+        if request is None:
+            request = self._own.request = self._compiled.create_infer_request()
+        request.infer(inputs, share_inputs=True)
+        return [tensor.data for tensor in request.output_tensors]
+
+
+@cache
+def open_network(file: Path) -> CpuNetwork:
+    """Open a model file, once for the whole process; `find_model` has checked what is in it.
+
+    Raises: InputError if it is no model.
+    """
+    return CpuNetwork(file)
+
+
+def _reason(error: RuntimeError) -> str:
+    """OpenVINO's reason: the last line that is not empty."""
+    return str(error).strip().splitlines()[-1]
