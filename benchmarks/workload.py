@@ -6,6 +6,7 @@ from itertools import cycle, islice
 from pathlib import Path
 
 import cv2
+import numpy as np
 import torch
 
 from motion_transfer.media.iuv.opening import open_reader, open_stream
@@ -15,6 +16,7 @@ from nhrr_core import ModelConfig, NeuralReRenderer
 
 DEMO = Path(__file__).parents[1] / "motion_transfer" / "demo"
 SOURCE = DEMO / "source.png"
+SIDE = 256  # px of the frames
 
 
 def driver_folder(folder: Path, frame_count: int) -> Path:
@@ -22,11 +24,18 @@ def driver_folder(folder: Path, frame_count: int) -> Path:
     path = folder / f"driver_{frame_count}"
     if not path.exists():
         path.mkdir(parents=True)
-        reader = open_reader(open_stream(DEMO / "driver.mkv"))
-        frames = list(reader.read(0, reader.stream.frame_count))
-        for index, iuv in enumerate(islice(cycle(frames), frame_count)):
+        for index, iuv in enumerate(islice(cycle(demo_crops(SIDE)), frame_count)):
             cv2.imwrite(str(path / f"{index:05d}_IUV.png"), iuv)  # RGB = V, U, I
     return path
+
+
+def demo_crops(size: int) -> list[np.ndarray]:
+    """The demo's frames, square and of that side, px."""
+    reader = open_reader(open_stream(DEMO / "driver.mkv"))
+    return [
+        cv2.resize(iuv, (size, size), interpolation=cv2.INTER_NEAREST_EXACT)
+        for iuv in reader.read(0, reader.stream.frame_count)
+    ]
 
 
 def weights_of(folder: Path, preset: str) -> Path:

@@ -7,8 +7,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import UInt8
 
 from motion_transfer.drawing.engines import Execution
+from motion_transfer.drawing.engines.graph_engine import GraphEngine
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
 from motion_transfer.drawing.person import bounding_box
 from motion_transfer.drawing.window import drawn_side, plan_window
@@ -38,7 +41,9 @@ def calibrate(
     """
     share = 0.5 if assets else 0.0
     people = StreamedPairs(seed=SEED, size=SIZE, noise=NOISE, assets=assets, free_share=share)
-    ranges = measure_ranges(weights, (_shown(people[number], done) for number in range(count)))
+    engine = OpenVinoEngine(weights, Execution("openvino", "f32", "cpu"))
+    shown = (_show(engine, people[number], done) for number in range(count))
+    ranges = measure_ranges(engine, shown)
     rounded = {name: [float(f"{end:.4g}") for end in ends] for name, ends in ranges.items()}
     with work_folder(out) as folder:
         written = folder / out.name
@@ -47,24 +52,27 @@ def calibrate(
     return ranges
 
 
-def measure_ranges(weights: Path, shown: Iterable[tuple[OpenedSource, np.ndarray]]) -> Ranges:
+def measure_ranges(
+    engine: GraphEngine, shown: Iterable[tuple[FeatureMap, UInt8[np.ndarray, "S S 3"]]]
+) -> Ranges:
     """Measure the least and the largest value that each convolution reads.
 
     Args:
-        shown: Sources, each with target IUV, H x W x 3.
+        shown: Feature maps, each with the crop of a target's IUV.
     """
-    engine = OpenVinoEngine(weights, Execution("openvino", "f32", "cpu"))
     ends: dict[str, list[float]] = {}
-    for source, iuv in shown:
-        window = plan_window([bounding_box(iuv)])
-        crop = window.cut(iuv, drawn_side(window.side, engine.config))
-        feature_map = engine.encode(source.prepare(engine.config.finest_texture))
-        for name, values in engine.read_by_convolutions(feature_map, crop).items():
+    for feature_map, iuv in shown:
+        for name, values in engine.read_by_convolutions(feature_map, iuv).items():
             ends.setdefault(name, []).extend((float(values.min()), float(values.max())))
     return {name: (min(values), max(values)) for name, values in ends.items()}
 
 
-def _shown(pair: Pair, done: Callable[[int], object]) -> tuple[OpenedSource, np.ndarray]:
-    shown = OpenedSource(pair.source.load()), pair.target.load().iuv
+def _show(
+    engine: GraphEngine, pair: Pair, done: Callable[[int], object]
+) -> tuple[FeatureMap, UInt8[np.ndarray, "S S 3"]]:
+    """Encode a pair's source, and cut out its target as a run would."""
+    source = OpenedSource(pair.source.load()).prepare(engine.config.finest_texture)
+    iuv = pair.target.load().iuv
+    window = plan_window([bounding_box(iuv)])
     done(1)
-    return shown
+    return engine.encode(source), window.cut(iuv, drawn_side(window.side, engine.config))

@@ -10,6 +10,7 @@ preview again and again as options change, and evaluation the drawing ones alone
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,7 +91,10 @@ def compose(
     options = settle_weights(options, listener)
     inputs = Inputs(appearance_files(options))
     recipe = open_recipe(options)
-    source = read_source(options, recipe.texture_size, listener)
+    with ThreadPoolExecutor(1) as beside:  # either keeps a core busy
+        ready = beside.submit(recipe.make_ready, [shot.window.side for shot in plan.shots])
+        source = read_source(options, recipe.texture_size, listener)
+        ready.result()
     for note in source.notes:
         listener(Notice(note))
     prepared = prepare_run(options, scan, plan, recipe, source, inputs, listener)

@@ -130,7 +130,7 @@ def choose_execution(wish: Wish, info: CheckpointInfo) -> Execution:
     elif precision not in possible:
         raise InputError(
             f"--precision int8: weights {info.path} do not say of which ranges their numbers are;"
-            " add them with mt weights calibrate, or choose bf16 or f32"
+            f" add that with mt calibrate {info.path}, or choose bf16 or f32"
         )
     return Execution(name, precision, device)
 

@@ -68,7 +68,8 @@ class GraphEngine(ABC):
 
         Args:
             sizes: Of inputs that the graph leaves open, where they are known.
-            exact: Whether it is computed in float32, whatever the engine's precision.
+            exact: Whether it is computed in float32, whatever the engine's precision, and a call at
+                a time.
         """
 
     def encode(self, source: Source) -> FeatureMap:
@@ -77,10 +78,14 @@ class GraphEngine(ABC):
             clearance = np.zeros((CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32)
         named = {TEXTURE: source.texture, VISIBILITY: source.visibility, CLEARANCE: clearance}
         inputs = {name: np.ascontiguousarray(array[None]) for name, array in named.items()}
-        return self.open(build_encoder(self.config, self._tensors), {}, exact=True).run(inputs)
+        return self._encoder.run(inputs)
+
+    @cached_property
+    def _encoder(self) -> Session:
+        return self.open(build_encoder(self.config, self._tensors), {}, exact=True)
 
     def prepare(self, side: int) -> None:
-        self._painter(side)
+        _ = self._painter(side), self._encoder
 
     def take(self, feature_map: FeatureMap) -> FeatureMap:
         return np.ascontiguousarray(feature_map)

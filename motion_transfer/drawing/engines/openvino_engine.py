@@ -38,14 +38,14 @@ class OpenVinoEngine(GraphEngine):
         graph = _core().read_model(model.SerializeToString())
         if sizes:
             graph.reshape({name: list(size) for name, size in sizes.items()})
-        exact = exact or self.execution.precision == EXACT
+        half = not exact and self.execution.precision != EXACT
         threads = core_count()
         settings = {
             # what is left of 8 bits is computed in 16 where that is fast
-            "INFERENCE_PRECISION_HINT": EXACT if exact else _half(),
+            "INFERENCE_PRECISION_HINT": _half() if half else EXACT,
             # calls side by side are as fast as two threads in one call, and any number of workers
-            # gives the same bits
-            "NUM_STREAMS": threads,
+            # gives the same bits; what is called once is done soonest by all threads
+            "NUM_STREAMS": 1 if exact else threads,
             "INFERENCE_NUM_THREADS": threads,
             "ENABLE_CPU_PINNING": False,
         }
