@@ -80,12 +80,10 @@ class Graph:
         Args:
             notes: Its metadata.
         """
+        read = {name for node in self._nodes for name in node.input}
+        constants = [held for held in self._constants.values() if held.name in read]
         graph = helper.make_graph(
-            self._nodes,
-            name,
-            self._inputs,
-            self._outputs,
-            initializer=list(self._constants.values()),
+            self._nodes, name, self._inputs, self._outputs, initializer=constants
         )
         opsets = [helper.make_opsetid("", OPSET)]
         model = helper.make_model(
