@@ -162,7 +162,7 @@ def overhead(folder: Path, sizes: Sizes) -> None:
     renderer, reader = prepared.recipe.renderer(composed.appearance), prepared.driver.open()
     window = prepared.plan.shots[0].window
     side = renderer.working_size(window.side)
-    iuv = reader.read(0, renderer.batch_size)
+    iuv = reader.read(0, renderer.batch_size(side))
     crops = np.stack([window.cut(frame, side) for frame in iuv])
     cores = torch.get_num_threads()
     batches = range(sum(-(-(c.stop - c.start) // len(crops)) for c in prepared.plan.chunks))

@@ -90,7 +90,7 @@ def compare(weights: Path, size: int, rounds: int) -> None:
             source = read_source(SourceOptions(source=(SOURCE,)), config.finest_texture)
             feature_map = engine.encode(source)
         taken = engine.take(feature_map)
-        batch = engine.batch_size
+        batch = engine.batch_size(size)
 
         def draw(index: int, engine=engine, taken=taken, batch=batch) -> np.ndarray:
             chosen = islice(cycle(crops), index % len(crops), index % len(crops) + batch)

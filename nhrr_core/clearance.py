@@ -43,15 +43,15 @@ def pixels_per_texel(
     It is the root of the number of the body's pixels over the number of texels that they fall into;
     1 where nobody is.
     """
-    index, row, column = (iuv[:, 0] > 0).nonzero(as_tuple=True)
-    body = iuv[index, :, row, column].T[None, :, None]  # 1 x 3 x 1 x N
-    place = texture_coordinates(body, charts)[0, 0]
-    x, y = (place * CLEARANCE_SIZE).long().clamp(0, CLEARANCE_SIZE - 1).unbind(1)
-    count, texels = iuv.shape[0], CLEARANCE_SIZE**2
-    hit = torch.zeros(count * texels, device=iuv.device)
-    hit[index * texels + y * CLEARANCE_SIZE + x] = 1
-    pixels = torch.bincount(index, minlength=count)
-    seen = hit.view(count, texels).sum(1)
+    body = iuv[:, 0] > 0
+    x, y = (texture_coordinates(iuv, charts) * CLEARANCE_SIZE).long().unbind(-1)
+    last, texels = CLEARANCE_SIZE - 1, CLEARANCE_SIZE**2
+    texel = y.clamp(0, last) * CLEARANCE_SIZE + x.clamp(0, last)
+    # the background falls on one more texel, which does not count: nothing waits for a device to
+    # tell where the body is
+    texel = torch.where(body, texel, texels).flatten(1)
+    hit = torch.zeros(iuv.shape[0], texels + 1, device=iuv.device).scatter_(1, texel, 1.0)
+    pixels, seen = body.flatten(1).sum(1), hit[:, :texels].sum(1)
     return torch.where(pixels > 0, pixels / seen.clamp_min(1), 1.0).sqrt()
 
 

@@ -33,21 +33,47 @@ def sample_features(
     maps, images = feature_map.shape[0], iuv.shape[0]
     if maps not in (1, images):
         raise ShapeError(f"{maps} feature maps for {images} IUV images; give 1 or {images}")
+    if iuv.device.type != "cpu":
+        return _sample_everywhere(feature_map, iuv, charts)
     image = feature_map.new_zeros(images, feature_map.shape[1], *iuv.shape[2:])
     for number, own_map in enumerate(feature_map.split(1)):
         shown = slice(None) if maps == 1 else slice(number, number + 1)
         index, row, column = (iuv[shown, 0] > 0).nonzero(as_tuple=True)  # often a tenth of all
         body = iuv[shown][index, :, row, column].T[None, :, None]  # 1 x 3 x 1 x N
-        grid = texture_coordinates(body, charts) * 2 - 1
-        sampled = F.grid_sample(
-            own_map,
-            grid.to(feature_map.dtype),
-            mode="bilinear",
-            padding_mode="border",
-            align_corners=False,
-        )
+        sampled = _sample(own_map, texture_coordinates(body, charts))
         image[shown][index, :, row, column] = sampled[0, :, 0].T
     return image
+
+
+def _sample_everywhere(
+    feature_map: Float[Tensor, "M D T T"],
+    iuv: UInt8[Tensor, "B 3 H W"],
+    charts: Float[Tensor, "24 256 256 2"],
+) -> Float[Tensor, "B D H W"]:
+    """Look up the background as well, then put 0 there.
+
+    It is more work, but a device is not asked where the body is: nobody waits for its answer, and
+    all that it does can be recorded as a CUDA graph.
+    """
+    places = texture_coordinates(iuv, charts)
+    if len(feature_map) == len(places):
+        sampled = _sample(feature_map, places)
+    else:  # one map: images are looked up as one tall image, without a copy of the map for each
+        tall = _sample(feature_map, places.flatten(0, 1)[None])
+        sampled = tall.unflatten(2, places.shape[:2])[0].transpose(0, 1)
+    return torch.where(iuv[:, :1] > 0, sampled, 0)
+
+
+def _sample(
+    feature_map: Float[Tensor, "M D T T"], places: Float[Tensor, "M H W 2"]
+) -> Float[Tensor, "M D H W"]:
+    return F.grid_sample(
+        feature_map,
+        (places * 2 - 1).to(feature_map.dtype),
+        mode="bilinear",
+        padding_mode="border",
+        align_corners=False,
+    )
 
 
 def spread_colours(

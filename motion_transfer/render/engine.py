@@ -126,8 +126,9 @@ class Engine:
         frames = self._read(chunk)
         on_their_way: deque[Callable[[], list[Frame]]] = deque()
         for shot in self._plan.shots_in(chunk):
-            for start in range(shot.start, shot.stop, self._renderer.batch_size):
-                count = min(self._renderer.batch_size, shot.stop - start)
+            size = self._renderer.batch_size(self._renderer.working_size(shot.window.side))
+            for start in range(shot.start, shot.stop, size):
+                count = min(size, shot.stop - start)
                 batch = list(islice(frames, count))
                 on_their_way.append(self._begin_batch(batch, start, shot.window))
                 if len(on_their_way) > self._ahead:
@@ -143,7 +144,7 @@ class Engine:
         """Have driver frames drawn, which make frames from `start` on; give what waits for it."""
         size = self._renderer.working_size(window.side)
         # padded to full batches: what one frame looks like must not depend on its neighbours
-        crops = np.zeros((self._renderer.batch_size, size, size, 3), np.uint8)
+        crops = np.zeros((self._renderer.batch_size(size), size, size, 3), np.uint8)
         for slot, iuv in enumerate(batch):
             crops[slot] = window.cut(iuv, size)
         drawn = partial(self._renderer.render, crops)

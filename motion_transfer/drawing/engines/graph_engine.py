@@ -49,7 +49,6 @@ class Session(Protocol):
 class GraphEngine(ABC):
     """Runs the graphs of one checkpoint, an image a call."""
 
-    batch_size = 1
     occupies: Occupied = "core"
 
     def __init__(self, weights: Path, execution: Execution) -> None:
@@ -71,6 +70,9 @@ class GraphEngine(ABC):
             exact: Whether it is computed in float32, whatever the engine's precision, and a call at
                 a time.
         """
+
+    def batch_size(self, side: int) -> int:  # noqa: ARG002 - an image is enough
+        return 1
 
     def encode(self, source: Source) -> FeatureMap:
         clearance = source.clearance

@@ -22,13 +22,15 @@ class Engine(Protocol):
     """A checkpoint that is ready to run; called from several threads.
 
     Attributes:
-        batch_size: Frames a call.
         occupies: What a call keeps busy.
     """
 
     config: ModelConfig
-    batch_size: int
     occupies: Occupied
+
+    def batch_size(self, side: int) -> int:
+        """Tell how many crops of that side, px, a call takes."""
+        ...
 
     def encode(self, source: Source) -> FeatureMap:
         """Compute a source's feature map, the same bits for any number of threads."""

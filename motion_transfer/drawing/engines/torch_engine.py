@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
+from queue import Queue
 
 import numpy as np
 import torch
@@ -15,7 +18,14 @@ from motion_transfer.drawing.engines.interface import FeatureMap, Occupied
 from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.source import Source
 from motion_transfer.weights.checkpoint import load_checkpoint
-from nhrr_core import NeuralReRenderer
+from nhrr_core import ModelConfig, NeuralReRenderer
+from nhrr_core.config import IUV_CHANNELS
+
+CPU_BATCH = 4
+BATCHES = (48, 24, 16, 12, 8, 6, 4, 3, 2, 1)  # divisors of a chunk's length, which is 48
+LANES = 2  # while one computes, the other copies
+LARGEST_LAYERS = 16  # about so many tensors of the first convolution's size are alive at a time
+MEMORY_SHARE = 0.25  # of what is free
 
 DTYPES = {"bf16": torch.bfloat16, "f32": torch.float32}
 
@@ -42,8 +52,6 @@ def open_engine(weights: Path, execution: Execution) -> TorchEngine:
 class TorchEngine:
     """A model in memory, its RenderNet in the engine's precision."""
 
-    batch_size = 4
-
     def __init__(self, model: NeuralReRenderer, execution: Execution) -> None:
         self.config = model.config
         self._device = torch.device(execution.device)
@@ -51,13 +59,27 @@ class TorchEngine:
         self._model = model.to(self._device)
         net = deepcopy(model.render_net).to(device=self._device, dtype=self._dtype)
         self._net = net.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
-        self.occupies: Occupied = "core" if self._device.type == "cpu" else "device"
+        self._on_cuda = self._device.type == "cuda"
+        self.occupies: Occupied = "device" if self._on_cuda else "core"
+        self._batches: dict[int, int] = {}
+        self._lanes: dict[int, Queue[_CudaLane]] = {}
+        self._opening = threading.Lock()
+
+    def batch_size(self, side: int) -> int:
+        """Tell how many crops of that side, px, a call takes."""
+        if not self._on_cuda:
+            return CPU_BATCH
+        if side not in self._batches:
+            free_bytes, _ = torch.cuda.mem_get_info(self._device)
+            self._batches[side] = choose_batch(self.config, side, free_bytes)
+        return self._batches[side]
 
     def encode(self, source: Source) -> FeatureMap:
         return encode_source(self._model, source).numpy()
 
     def prepare(self, side: int) -> None:
-        pass
+        if self._on_cuda:
+            self._lanes_of(side)
 
     def take(self, feature_map: FeatureMap) -> Tensor:
         return torch.from_numpy(feature_map).to(self._device)
@@ -65,22 +87,100 @@ class TorchEngine:
     def draw(
         self, feature_map: Tensor, iuv: UInt8[np.ndarray, "B S S 3"]
     ) -> UInt8[np.ndarray, "B S S K"]:
-        with torch.inference_mode():
-            features = self._features(feature_map, iuv)
-            drawn = self._net(features.to(self._dtype, memory_format=torch.channels_last)).float()
-            frame = self._model.blend(drawn, features)
-            levels = ((frame + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
-            return levels.permute(0, 2, 3, 1).cpu().numpy()
+        side = iuv.shape[1]
+        if not self._on_cuda or len(iuv) != self.batch_size(side):
+            frames = self._frames(feature_map, torch.from_numpy(iuv).to(self._device))
+            return frames.cpu().numpy()
+        lanes = self._lanes_of(side)
+        lane = lanes.get()
+        try:
+            return lane.draw(feature_map, iuv)
+        finally:
+            lanes.put(lane)
 
     def feature_image(
         self, feature_map: Tensor, iuv: UInt8[np.ndarray, "B S S 3"]
     ) -> Float[np.ndarray, "B C S S"]:
         with torch.inference_mode():
-            return self._features(feature_map, iuv).float().cpu().numpy()
+            target = torch.from_numpy(iuv).to(self._device).permute(0, 3, 1, 2)
+            return self._model.feature_image(feature_map, target).float().cpu().numpy()
 
-    def _features(self, feature_map: Tensor, iuv: UInt8[np.ndarray, "B S S 3"]) -> Tensor:
-        target = torch.from_numpy(iuv).to(self._device).permute(0, 3, 1, 2)
-        return self._model.feature_image(feature_map, target)
+    def _frames(self, feature_map: Tensor, iuv: Tensor) -> Tensor:
+        """Draw B x S x S x 3 uint8 as B x S x S x K uint8, where they lie."""
+        with torch.inference_mode():
+            features = self._model.feature_image(feature_map, iuv.permute(0, 3, 1, 2))
+            drawn = self._net(features.to(self._dtype, memory_format=torch.channels_last)).float()
+            frame = self._model.blend(drawn, features)
+            levels = ((frame + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
+            return levels.permute(0, 2, 3, 1).contiguous()
+
+    def _lanes_of(self, side: int) -> Queue[_CudaLane]:
+        with self._opening:
+            if side not in self._lanes:
+                lanes: Queue[_CudaLane] = Queue()
+                size = self.batch_size(side)
+                for _ in range(LANES):
+                    lanes.put(_CudaLane(self._frames, self.config, size, side, self._device))
+                self._lanes[side] = lanes
+        return self._lanes[side]
+
+
+class _CudaLane:
+    """One of several ways through a CUDA device: while one computes, another copies.
+
+    Everything from IUV to frames is recorded once as a CUDA graph and then started by one call;
+    what crosses the bus is 8 bits a channel, from and to pinned memory.
+    """
+
+    def __init__(
+        self,
+        frames: Callable[[Tensor, Tensor], Tensor],
+        config: ModelConfig,
+        batch: int,
+        side: int,
+        device: torch.device,
+    ) -> None:
+        def pinned(channels: int) -> Tensor:
+            return torch.empty((batch, side, side, channels), dtype=torch.uint8, pin_memory=True)
+
+        texels = config.finest_texture
+        self._stream = torch.cuda.Stream(device)
+        self._shown: Tensor | None = None
+        self._host_iuv, self._host_frames = pinned(IUV_CHANNELS), pinned(config.render_outputs)
+        self._iuv = torch.zeros_like(self._host_iuv, device=device)
+        self._map = torch.zeros((1, config.map_channels, texels, texels), device=device)
+        self._graph = torch.cuda.CUDAGraph()
+        torch.cuda.synchronize(device)
+        with torch.cuda.stream(self._stream):  # as recording asks for: once before, aside
+            frames(self._map, self._iuv)
+        self._stream.synchronize()
+        with torch.cuda.graph(self._graph, stream=self._stream):
+            self._frames = frames(self._map, self._iuv)
+
+    def draw(
+        self, feature_map: Tensor, iuv: UInt8[np.ndarray, "B S S 3"]
+    ) -> UInt8[np.ndarray, "B S S K"]:
+        """Draw a batch; waits for the device without Python's lock."""
+        self._host_iuv.numpy()[:] = iuv
+        with torch.cuda.stream(self._stream):
+            if self._shown is not feature_map:
+                self._map.copy_(feature_map)
+                self._shown = feature_map
+            self._iuv.copy_(self._host_iuv, non_blocking=True)
+            self._graph.replay()
+            self._host_frames.copy_(self._frames, non_blocking=True)
+        self._stream.synchronize()
+        return self._host_frames.numpy().copy()
+
+
+def choose_batch(config: ModelConfig, side: int, free_bytes: int) -> int:
+    """Choose how many crops fill a device: as many as a share of its free memory holds.
+
+    The result divides a chunk of a run, so that few crops are drawn for nothing.
+    """
+    each_bytes = side**2 * config.render_width * LARGEST_LAYERS * torch.bfloat16.itemsize
+    fitting = max(1, int(free_bytes * MEMORY_SHARE / LANES / each_bytes))
+    return next(batch for batch in BATCHES if batch <= fitting)
 
 
 def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:

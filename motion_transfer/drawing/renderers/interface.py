@@ -20,18 +20,20 @@ class Renderer(Protocol):
 
     Attributes:
         name: What `mt run` reports.
-        batch_size: Frames a call; the engine pads the last batch of a chunk to it.
         occupies: What a call keeps busy.
         feature_channels: How many channels of its appearance are learned features; 0: none is.
     """
 
     name: str
-    batch_size: int
     occupies: Occupied
     feature_channels: int
 
     def working_size(self, window_side: int) -> int:
         """Tell the side, px, of the crops it wants for a window of that side, px, in the driver."""
+        ...
+
+    def batch_size(self, side: int) -> int:
+        """Tell how many crops of that side, px, a call takes; a chunk's last batch is padded."""
         ...
 
     def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:

@@ -123,12 +123,14 @@ class NeuralRenderer:
     def __init__(self, engine: Engine, appearance: Appearance) -> None:
         self._engine = engine
         self._feature_map = engine.take(appearance)
-        self.batch_size = engine.batch_size
         self.occupies: Occupied = engine.occupies
         self.feature_channels = engine.config.feature_outputs
 
     def working_size(self, window_side: int) -> int:
         return drawn_side(window_side, self._engine.config)
+
+    def batch_size(self, side: int) -> int:
+        return self._engine.batch_size(side)
 
     def feature_image(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> Float[np.ndarray, "B D S S"]:
         return self._engine.feature_image(self._feature_map, iuv)

@@ -67,7 +67,6 @@ class TextureRenderer:
     """
 
     name = "texture"
-    batch_size = 1
     occupies: Occupied = "nothing"
     feature_channels = 0
 
@@ -76,6 +75,9 @@ class TextureRenderer:
 
     def working_size(self, window_side: int) -> int:
         return window_side
+
+    def batch_size(self, side: int) -> int:
+        return 1
 
     def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:
         return np.stack([self._draw(crop) for crop in iuv])

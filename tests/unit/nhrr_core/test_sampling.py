@@ -7,7 +7,7 @@ from reference.nhrr_core_loops import sample_features_loops
 from torch import Tensor
 
 from nhrr_core import ShapeError, sample_features
-from nhrr_core.sampling import signed_distance, spread_colours
+from nhrr_core.sampling import _sample_everywhere, signed_distance, spread_colours
 
 
 @pytest.fixture
@@ -193,3 +193,18 @@ def _distance_by_pairs(mask: Tensor) -> Tensor:
     """From every pixel to the nearest of the mask, each against each."""
     places = torch.ones_like(mask).nonzero().float()
     return torch.cdist(places, mask.nonzero().float()).amin(1).view(mask.shape)
+
+
+@pytest.mark.parametrize("maps", [1, 3])
+def test_the_look_up_of_devices_is_the_same(maps: int, noise: Tensor, charts: Tensor) -> None:
+    """They look the background up as well, so that nobody has to ask them where the body is."""
+    iuv = torch.cat([noise, noise.flip(-1), noise.flip(-2)])[:3]
+    feature_map = torch.randn(maps, 5, 16, 16, requires_grad=True)
+    everywhere = _sample_everywhere(feature_map, iuv, charts)
+    expected = sample_features(feature_map, iuv, charts)
+    torch.testing.assert_close(everywhere, expected)
+    gradients = [
+        torch.autograd.grad((image * torch.arange(5)[:, None, None]).sum(), feature_map)[0]
+        for image in (everywhere, expected)
+    ]
+    torch.testing.assert_close(*gradients)

@@ -29,8 +29,6 @@ class Slow:
     """Paints the IUV, after a while; knows how many calls there were at a time, and by whom."""
 
     name = "slow"
-    batch_size = BATCH
-
     def __init__(self, occupies: Occupied, *, fails_at: int = -1) -> None:
         self.occupies: Occupied = occupies
         self.calls = 0
@@ -43,6 +41,9 @@ class Slow:
 
     def working_size(self, window_side: int) -> int:
         return window_side
+
+    def batch_size(self, side: int) -> int:
+        return BATCH
 
     def render(self, iuv: np.ndarray) -> np.ndarray:
         with self._lock:

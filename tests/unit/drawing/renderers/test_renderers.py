@@ -32,7 +32,7 @@ def renderer(request, source: Source, checkpoint: Path) -> Renderer:
 def crops(studio, renderer: Renderer) -> np.ndarray:
     size = renderer.working_size(64)
     pose = studio.iuv(8, -20, size=(size, size))
-    return np.stack([pose] + [np.zeros_like(pose)] * (renderer.batch_size - 1))
+    return np.stack([pose] + [np.zeros_like(pose)] * (renderer.batch_size(size) - 1))
 
 
 def test_a_renderer_gives_colour_and_coverage(studio, renderer: Renderer) -> None:

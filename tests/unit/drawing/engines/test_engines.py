@@ -1,0 +1,223 @@
+"""Every engine draws what the specification draws, and says what it cannot."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motion_transfer.drawing.engines import ENGINES, Execution, Wish, choose_execution, open_engine
+from motion_transfer.drawing.engines.graph_engine import GraphEngine
+from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
+from motion_transfer.drawing.engines.outline import pixels_per_texel, signed_distance
+from motion_transfer.drawing.engines.torch_engine import BATCHES, choose_batch
+from motion_transfer.errors import InputError, WeightsError
+from motion_transfer.evaluation.calibration import measure_ranges
+from motion_transfer.render.options import SourceOptions
+from motion_transfer.render.plan import CHUNK_FRAMES
+from motion_transfer.render.source import read_source
+from motion_transfer.weights.checkpoint import (
+    RANGES,
+    copy_with_notes,
+    inspect_checkpoint,
+    load_checkpoint,
+    read_ranges,
+    save_checkpoint,
+)
+from nhrr_core import ModelConfig, NeuralReRenderer, clearance, load_uv_layout, sampling
+
+SIDE = 64
+EXACT = Execution("torch", "f32", "cpu")
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small model with all that `lite` has."""
+    torch.manual_seed(0)
+    small = {"feature_width": 4, "render_width": 8, "texture_size": 64}
+    config = ModelConfig.preset("lite", alpha=True, **small)
+    model = NeuralReRenderer(config)
+    path = tmp_path_factory.mktemp("weights") / "small.safetensors"
+    save_checkpoint(path, model)
+    return path
+
+
+@pytest.fixture
+def source(studio):
+    return read_source(SourceOptions(source=(studio.source(),)), 128)
+
+
+@pytest.fixture
+def crops(studio) -> np.ndarray:
+    return np.stack([studio.iuv(4 * i, -20 * i, size=(SIDE, SIDE)) for i in range(3)])
+
+
+@pytest.fixture
+def calibrated(weights: Path, source, crops, tmp_path: Path) -> Path:
+    engine = OpenVinoEngine(weights, Execution("openvino", "f32", "cpu"))
+    feature_map = engine.encode(source)
+    ranges = measure_ranges(engine, ((feature_map, crop) for crop in crops))
+    copy_with_notes(weights, tmp_path / "calibrated.safetensors", {RANGES: json.dumps(ranges)})
+    return tmp_path / "calibrated.safetensors"
+
+
+@pytest.mark.parametrize(
+    ("how", "levels"),
+    [
+        (Execution("openvino", "f32", "cpu"), 1),
+        (Execution("onnx", "f32", "cpu"), 1),
+        (Execution("torch", "bf16", "cpu"), 16),
+        (Execution("openvino", "bf16", "cpu"), 16),
+        (Execution("openvino", "int8", "cpu"), 40),
+        (Execution("onnx", "int8", "cpu"), 40),
+    ],
+    ids=str,
+)
+def test_engines_draw_what_torch_draws(
+    calibrated: Path, source, crops: np.ndarray, how: Execution, levels: int
+) -> None:
+    exact, engine = open_engine(calibrated, EXACT), open_engine(calibrated, how)
+    expected = exact.draw(exact.take(exact.encode(source)), crops)
+    feature_map = engine.encode(source)
+    np.testing.assert_allclose(feature_map, exact.encode(source), rtol=0, atol=1e-4)
+    drawn = engine.draw(engine.take(feature_map), crops)
+    assert (drawn.dtype, drawn.shape) == (np.uint8, (3, SIDE, SIDE, 4))
+    away = np.abs(drawn.astype(int) - expected)
+    assert away.max() <= levels
+    assert away.mean() <= max(0.05, levels / 8)  # weights at random exaggerate
+
+
+@pytest.mark.parametrize("name", ["openvino", "onnx"])
+def test_graphs_give_the_features_that_torch_gives(
+    weights: Path, source, crops: np.ndarray, name: str
+) -> None:
+    exact, engine = (
+        open_engine(weights, Execution(each, "f32", "cpu")) for each in ("torch", name)
+    )
+    feature_map = exact.encode(source)
+    features = engine.feature_image(engine.take(feature_map), crops)
+    expected = exact.feature_image(exact.take(feature_map), crops)
+    np.testing.assert_allclose(features, expected, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("precision", ["bf16", "int8"])
+def test_calls_side_by_side_draw_the_same(
+    calibrated: Path, source, crops: np.ndarray, precision: str
+) -> None:
+    engine = open_engine(calibrated, Execution("openvino", precision, "cpu"))
+    feature_map = engine.take(engine.encode(source))
+    alone = [engine.draw(feature_map, crops[i : i + 1]) for i in range(3)]
+    with ThreadPoolExecutor(3) as threads:
+        calls = [
+            threads.submit(engine.draw, feature_map, crops[i % 3 : i % 3 + 1]) for i in range(9)
+        ]
+    for number, call in enumerate(calls):
+        np.testing.assert_array_equal(call.result(), alone[number % 3])
+
+
+def test_the_outline_is_torchs(crops: np.ndarray) -> None:
+    iuv = torch.from_numpy(crops).permute(0, 3, 1, 2)
+    distances = sampling.signed_distance(iuv[:, :1] > 0, 24)[:, 0].numpy()
+    scales = clearance.pixels_per_texel(iuv, load_uv_layout().charts).numpy()
+    for crop, distance, scale in zip(crops, distances, scales, strict=True):
+        np.testing.assert_allclose(signed_distance(crop), distance, rtol=0, atol=1e-5)
+        assert pixels_per_texel(crop) == pytest.approx(scale)
+
+
+@pytest.mark.parametrize("blank", [0, 1], ids=["nobody", "everywhere"])
+def test_an_outline_that_is_not_there(blank: int) -> None:
+    iuv = np.full((SIDE, SIDE, 3), blank, np.uint8)
+    expected = sampling.signed_distance(torch.from_numpy(iuv[None, None, ..., 0] > 0), 24)
+    np.testing.assert_allclose(signed_distance(iuv), expected[0, 0].numpy())
+
+
+def test_ranges_hold_what_is_read(weights: Path, source, crops: np.ndarray) -> None:
+    """As torch's own convolutions read it."""
+    engine = OpenVinoEngine(weights, Execution("openvino", "f32", "cpu"))
+    feature_map = engine.encode(source)
+    ranges = measure_ranges(engine, ((feature_map, crop) for crop in crops))
+    model, read = load_checkpoint(weights), {}
+    for name, layer in model.render_net.named_modules():
+        if isinstance(layer, torch.nn.Conv2d | torch.nn.ConvTranspose2d):
+            layer.register_forward_pre_hook(
+                lambda _layer, inputs, name=name: read.setdefault(name, []).append(inputs[0])
+            )
+    with torch.inference_mode():
+        iuv = torch.from_numpy(crops).permute(0, 3, 1, 2)
+        model.render(torch.from_numpy(feature_map), iuv)
+    assert {name.removeprefix("render_net.") for name in ranges} == set(read)
+    for name, values in read.items():
+        least, largest = ranges[f"render_net.{name}"]
+        assert least == pytest.approx(float(values[0].min()), abs=1e-3)
+        assert largest == pytest.approx(float(values[0].max()), abs=1e-3)
+
+
+def test_eight_bits_are_taken_where_the_ranges_are_known(weights: Path, calibrated: Path) -> None:
+    wish = Wish(engine="onnx")
+    assert choose_execution(wish, inspect_checkpoint(weights)).precision == "f32"
+    assert choose_execution(wish, inspect_checkpoint(calibrated)).precision == "int8"
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        (Wish(precision="int8"), "do not say of which ranges .* mt calibrate"),
+        (Wish(engine="torch", precision="int8"), "torch has bf16, f32; choose one of them"),
+        (Wish(engine="openvino", device="cuda"), "openvino runs on CPUs; choose --engine torch"),
+        (Wish(device="cuda:7"), "torch finds .*; choose another, or cpu"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_is_said(weights: Path, wish: Wish, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        choose_execution(wish, inspect_checkpoint(weights))
+
+
+def test_a_missing_library_is_named(weights: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
+    with pytest.raises(InputError, match="--engine onnx needs onnxruntime; pip install"):
+        choose_execution(Wish(engine="onnx"), inspect_checkpoint(weights))
+    assert not ENGINES["openvino"].installed
+
+
+@pytest.mark.parametrize(
+    "ranges",
+    [
+        *("{", "[]", "{}", '{"other": [0, 1]}', '{"render_net.layers.1": [1, 0]}'),
+        *('{"render_net.layers.1": [0]}', '{"render_net.layers.1": ["a", 1]}', '{"a": NaN}'),
+    ],
+)
+def test_broken_ranges_are_refused(weights: Path, tmp_path: Path, ranges: str) -> None:
+    path = tmp_path / "broken.safetensors"
+    copy_with_notes(weights, path, {RANGES: ranges})
+    with pytest.raises(WeightsError, match="broken ranges of their numbers; measure them again"):
+        read_ranges(inspect_checkpoint(path))
+
+
+def test_notes_are_added_and_tensors_stay(weights: Path, tmp_path: Path) -> None:
+    path = tmp_path / "copy.safetensors"
+    copy_with_notes(weights, path, {"licence": "CC0"})
+    assert inspect_checkpoint(path).notes == {"licence": "CC0"}
+    one, other = load_checkpoint(weights), load_checkpoint(path)
+    assert one.config == other.config
+    for name, tensor in one.state_dict().items():
+        assert torch.equal(tensor, other.state_dict()[name])
+
+
+def test_batches_divide_a_chunk_and_fit_the_memory() -> None:
+    assert all(CHUNK_FRAMES % batch == 0 for batch in BATCHES)
+    config = ModelConfig.preset("paper")
+    sizes = [choose_batch(config, 256, free << 30) for free in (0, 4, 16, 80)]
+    assert sizes == sorted(sizes)
+    assert (sizes[0], sizes[-1]) == (1, CHUNK_FRAMES)
+    assert choose_batch(config, 512, 16 << 30) < choose_batch(config, 256, 16 << 30)
+
+
+def test_graph_engines_take_an_image_a_call(weights: Path) -> None:
+    engine = open_engine(weights, Execution("openvino", "f32", "cpu"))
+    assert isinstance(engine, GraphEngine)
+    assert engine.batch_size(SIDE) == 1
