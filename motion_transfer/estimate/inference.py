@@ -37,19 +37,12 @@ class CpuNetwork:
             "ENABLE_CPU_PINNING": False,
         }
         core = openvino.Core()
-        try:
-            with quiet_libraries():
-                read = core.read_model(
-                    model if isinstance(model, Path) else model.SerializeToString()
-                )
-                self._compiled = core.compile_model(read, "CPU", settings)
-        except RuntimeError as error:
-            if not isinstance(model, Path):
-                raise
-            raise InputError(
-                f"{model} is not a model that can be run ({_reason(error)}); `mt models fetch"
-                " --force` fetches it anew"
-            ) from error
+        graph = (
+            _read(core, model)
+            if isinstance(model, Path)
+            else core.read_model(model.SerializeToString())
+        )
+        self._compiled = core.compile_model(graph, "CPU", settings)
         self._own = threading.local()
 
     def run(self, *inputs: np.ndarray) -> list[np.ndarray]:
@@ -76,6 +69,13 @@ def open_network(file: Path) -> CpuNetwork:
     return CpuNetwork(file)
 
 
-def _reason(error: RuntimeError) -> str:
-    """OpenVINO's reason: the last line that is not empty."""
-    return str(error).strip().splitlines()[-1]
+def _read(core: openvino.Core, file: Path) -> openvino.Model:
+    try:
+        with quiet_libraries():  # the readers of other formats say why it is none of theirs
+            return core.read_model(file)
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[-1]
+        raise InputError(
+            f"{file} is not a model that can be run ({reason}); `mt models fetch --force` fetches"
+            " it anew"
+        ) from error

@@ -3,6 +3,7 @@ this project paints their IUV from landmarks and mask."""
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,13 @@ from motion_transfer.drawing.person import Box
 from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
-from motion_transfer.estimate.inference import CpuNetwork
+from motion_transfer.estimate.inference import CpuNetwork, open_network
 from motion_transfer.estimate.interface import Finish, PersonEstimate, check_frame
 from motion_transfer.estimate.iuv.body import MASK_SIZE, body_arrays, body_window
 from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
-from motion_transfer.estimate.models import MODEL_FILES, digest
+from motion_transfer.estimate.models import MODEL_FILES, digest, find_model
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -51,8 +52,12 @@ class BlazePoseEstimator:
         frame_rate: float = 30.0,
         fit: BodyFit | None = None,
     ) -> None:
+        with ThreadPoolExecutor() as threads:  # each takes a quarter of a second
+            network = threads.submit(_open_painter, weights)
+            for _ in threads.map(open_network, map(find_model, MODEL_FILES)):
+                pass  # the tracker finds them open
+        self._network = network.result()
         self._tracker = BodyTracker(most_people=most_people, smooth=smooth, frame_rate=frame_rate)
-        self._network = CpuNetwork(build_graph(weights)) if weights else _open_shipped()
         self._fit = fit
 
     def start_shot(self) -> None:
@@ -103,8 +108,12 @@ class BlazePoseEstimator:
 
 @cache
 def _open_shipped() -> CpuNetwork:
-    """Open the network that paints IUV, once for the whole process. Raises: WeightsError."""
     return CpuNetwork(build_graph(find_shipped()))
+
+
+def _open_painter(weights: Path | None) -> CpuNetwork:
+    """Open the network that paints IUV; that of the package, once a process."""
+    return CpuNetwork(build_graph(weights)) if weights else _open_shipped()
 
 
 def model_facts(_model: None = None) -> dict[str, Any]:
