@@ -80,16 +80,23 @@ class TextureRenderer:
         return 1
 
     def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:
-        return np.stack([self._draw(crop) for crop in iuv])
+        pictures = np.zeros((*iuv.shape[:-1], 4), np.uint8)
+        for index in range(len(iuv)):
+            self._draw(pictures[index], iuv[index])
+        return pictures
 
     def feature_image(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> Float[np.ndarray, "B D S S"]:
         raise NotImplementedError("there are no features")
 
-    def _draw(self, iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S 4"]:
-        index = cv2.transform(iuv.astype(np.float32), CODE_WEIGHTS).astype(np.int32)
-        rgba = self._table.take(index).view(np.uint8).reshape(*iuv.shape[:2], 4)
-        rgba[..., 3] = soften(rgba[..., 3])
-        return rgba
+    def _draw(self, picture: UInt8[np.ndarray, "S S 4"], iuv: UInt8[np.ndarray, "S S 3"]) -> None:
+        """Draw into an empty picture."""
+        left, top, width, height = cv2.boundingRect(np.ascontiguousarray(iuv[..., 0]))
+        if not width:
+            return
+        person = np.s_[top : top + height, left : left + width]
+        index = cv2.transform(iuv[person].astype(np.float32), CODE_WEIGHTS).astype(np.int32)
+        picture[person] = self._table.take(index).view(np.uint8).reshape(height, width, 4)
+        picture[..., 3] = soften(picture[..., 3])
 
 
 def tabulate_texture(source: Source) -> UInt8[np.ndarray, "25 256 256 4"]:

@@ -19,7 +19,7 @@ import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError
 from av.video.codeccontext import VideoCodecContext
-from av.video.reformatter import ColorRange, Colorspace, Interpolation
+from av.video.reformatter import ColorRange, Colorspace, Interpolation, VideoReformatter
 from jaxtyping import UInt8
 
 from motion_transfer.errors import OutputError
@@ -70,9 +70,11 @@ def open_segment(
                 f" ({error.strerror}); choose another --codec or --fps"
             ) from error
         numbers = count()
+        reformatter = VideoReformatter()  # kept: to make one takes longer than to use it
 
         def write(frame: UInt8[np.ndarray, "H W 3"]) -> None:
-            picture = av.VideoFrame.from_ndarray(frame, format="rgb24").reformat(**conversion)
+            picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
+            picture = reformatter.reformat(picture, **conversion)
             picture.pts, picture.time_base = next(numbers), context.time_base
             container.mux(stream.encode(picture))
 
