@@ -14,8 +14,9 @@ from motion_transfer.drawing.person import Box
 from nhrr_core import ModelConfig
 
 MARGIN = 0.08  # of the person's longer side, on each side at least: room for hair and clothes
-SIDE_STEP = 32
-"""Windows have a side of a multiple of this, px, which networks can draw without scaling it."""
+SIDE_STEP, LEAST_SIDE = 8, 32
+"""Windows have a side of a multiple of the first, px, which networks can draw without scaling it;
+a larger step would have them draw more background."""
 
 DRAWN_UNSCALED = (0.75, 2.5)
 """Windows of so many times its image size are drawn by a network without scaling them."""
@@ -67,6 +68,7 @@ def plan_window(boxes: Iterable[Box | None]) -> Window:
     right, bottom = max(box.right for box in seen), max(box.bottom for box in seen)
     longer = max(right - left, bottom - top)
     side = math.ceil(longer * (1 + 2 * MARGIN) / SIDE_STEP) * SIDE_STEP
+    side = max(side, LEAST_SIDE)
     return Window(x=(left + right - side) // 2, y=(top + bottom - side) // 2, side=side)
 
 

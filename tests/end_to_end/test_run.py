@@ -117,7 +117,7 @@ def test_a_crop_shows_the_window(studio, draft) -> None:
     source, driver, output = studio.source(), studio.array(frames), studio.folder / "out"
     draft("--source", source, "--driver", driver, "-o", output, "--size", "crop")
     side = frames_of(output).shape[1]
-    assert side == 128  # the least multiple of 32 with a margin on both sides
+    assert side == 104  # the least multiple of 8 with a margin on both sides
     centre = frames_of(output)[0, side // 2 - 16, side // 2]
     np.testing.assert_allclose(centre, CLOTHES[TORSO], atol=1)
 

@@ -14,7 +14,7 @@ import onnx
 from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.engines import Execution
-from motion_transfer.drawing.engines.interface import FeatureMap, Occupied
+from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
 from motion_transfer.drawing.graphs.whole import (
     CLEARANCE,
@@ -132,11 +132,12 @@ class GraphEngine(ABC):
         return inputs
 
     def _painter(self, side: int) -> Session:
-        if side not in self._painters:
-            with self._opening:
-                if side not in self._painters:
-                    self._painters[side] = self._open_painter(side)
-        return self._painters[side]
+        with self._opening:
+            painter = self._painters.pop(side, None) or self._open_painter(side)
+            self._painters[side] = painter  # the last of them was used last
+            while len(self._painters) > KEPT_SIZES:
+                del self._painters[next(iter(self._painters))]
+        return painter
 
     def _open_painter(self, side: int) -> Session:
         tensors, ranges = self._tensors, self._ranges

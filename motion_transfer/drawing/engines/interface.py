@@ -15,6 +15,9 @@ Occupied = Literal["core", "device", "nothing"]
 each worker; the `device`, so that one thread makes them; or `nothing`, and whoever wants a picture
 draws it."""
 
+KEPT_SIZES = 4
+"""Of crops, for which an engine stays ready; each takes memory for its activations."""
+
 FeatureMap = Float[np.ndarray, "1 D T T"]
 
 

@@ -14,7 +14,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.engines import Execution
-from motion_transfer.drawing.engines.interface import FeatureMap, Occupied
+from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.source import Source
 from motion_transfer.weights.checkpoint import load_checkpoint
@@ -122,7 +122,9 @@ class TorchEngine:
                 for _ in range(LANES):
                     lanes.put(_CudaLane(self._frames, self.config, size, side, self._device))
                 self._lanes[side] = lanes
-        return self._lanes[side]
+                while len(self._lanes) > KEPT_SIZES:
+                    del self._lanes[next(iter(self._lanes))]
+            return self._lanes[side]
 
 
 class _CudaLane:

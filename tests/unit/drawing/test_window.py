@@ -95,6 +95,7 @@ def test_a_speck_gets_a_window_that_codecs_take() -> None:
         (960, 512, 3, 960),
         (270, 256, 3, 256),  # given by hand: RenderNet halves sides
         (330, 256, 3, 512),
+        (264, 256, 3, 264),
         (288, 256, 6, 256),
         (320, 256, 6, 320),
     ],
