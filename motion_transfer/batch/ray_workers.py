@@ -13,10 +13,10 @@ from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
-from motion_transfer.batch.tasks import Fetch
 from motion_transfer.cores import take_share
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
+from motion_transfer.render.workers import Fetch
 
 # read when ray is imported: an actor without a GPU of its own keeps CUDA_VISIBLE_DEVICES as it is
 os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")

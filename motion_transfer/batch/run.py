@@ -15,9 +15,9 @@ from motion_transfer.batch.report import write_report
 from motion_transfer.batch.schedule import Scheduler, Tally
 from motion_transfer.batch.signals import Signals
 from motion_transfer.batch.state import TO_DO, BatchState
-from motion_transfer.batch.workers import LocalWorkers, Workers
 from motion_transfer.errors import InputError
 from motion_transfer.media.publish import explain_disk_errors
+from motion_transfer.render.workers import LocalWorkers, Workers
 
 ENGINES = ("local", "ray")
 MOST_PROBLEMS = 10  # missing inputs that are named; a wrong folder misses them all

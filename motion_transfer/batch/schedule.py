@@ -21,11 +21,12 @@ from motion_transfer.batch.active import ActiveJob, Shared, scan_name, source_na
 from motion_transfer.batch.expand import Job
 from motion_transfer.batch.signals import Signals
 from motion_transfer.batch.state import BatchState, is_current, is_ours, sign
-from motion_transfer.batch.workers import Workers
 from motion_transfer.errors import InputError, MotionTransferError, OutputError
 from motion_transfer.media.publish import check_destination, explain_disk_errors
 from motion_transfer.media.unchanged import status_key
 from motion_transfer.media.work import WorkFolder, was_published
+from motion_transfer.render.chunks import render
+from motion_transfer.render.workers import Workers
 
 POLL_SECONDS = 0.5  # how soon a signal is heeded
 SPARE_JOBS = 2  # planned ahead, beyond one for each worker
@@ -220,10 +221,12 @@ class Scheduler:
             active.source.name,
             active.source.blobs["appearance"],
             active.work.path,
+            active.job.options.output,
             [(c.index, active.work.temporary(c.piece), c.piece) for c in chunks],
             active.job.options.sheet is not None,
+            True,
         )
-        return Task(tasks.render, arguments, active, chunks=chunks)
+        return Task(render, arguments, active, chunks=chunks)
 
     def _begin(self, job: Job) -> None:
         options = job.options

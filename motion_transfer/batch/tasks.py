@@ -1,4 +1,4 @@
-"""What workers do: functions of plain arguments, and what a worker keeps warm between them.
+"""What workers do for a batch besides rendering: functions of plain arguments.
 
 A task takes and gives blobs: what one worker computed (a driver's scan, a source's appearance, a
 prepared run) goes to the others as bytes, which the scheduler hands around and never opens.
@@ -7,31 +7,18 @@ prepared run) goes to the others as bytes, which the scheduler hands around and 
 from __future__ import annotations
 
 import pickle
-from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from motion_transfer.batch.state import Files
 from motion_transfer.media.unchanged import Inputs
+from motion_transfer.render.chunks import PICKLE_PROTOCOL
 from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.workers import Fetch
 
 if TYPE_CHECKING:  # the scheduler imports this module, and has no need of the libraries below
-    import numpy as np
-
-    from motion_transfer.drawing.renderers.interface import Renderer
-    from motion_transfer.media.iuv.stream import IuvReader
-    from motion_transfer.render.composition import DriverFile, Prepared
-    from motion_transfer.render.plan import Chunk
-
-KEPT_OBJECTS = 16  # of a few jobs at once: run, renderer and reader of each
-KEPT_FRAMES_BYTES = 256 << 20
-"""A worker keeps the decoded frames of its last chunk, for the next source with that driver."""
-
-PICKLE_PROTOCOL = 5  # large arrays are not copied on their way
-Fetch = Callable[[], bytes]
-"""Gives a blob, wherever it lies; what `Workers.share` returns."""
+    from motion_transfer.render.composition import Prepared
 
 
 @dataclass(frozen=True)
@@ -69,27 +56,6 @@ class Outline:
     output_key: str
     note: str
     files: Files
-
-
-class Warm:
-    """What a worker process keeps between tasks; the oldest goes first."""
-
-    def __init__(self) -> None:
-        self._objects: OrderedDict[str, Any] = OrderedDict()
-        self.frames: tuple[Any, list[np.ndarray]] = (None, [])
-
-    def get(self, name: str, make: Callable[[], Any]) -> Any:
-        """Give the object of a name; make it if it is not there."""
-        if name not in self._objects:
-            self._objects[name] = make()
-            while len(self._objects) > KEPT_OBJECTS:
-                self._objects.popitem(last=False)
-        self._objects.move_to_end(name)
-        return self._objects[name]
-
-
-WARM = Warm()
-"""Kept by this worker process."""
 
 
 def scan(options: RenderOptions, folder: Path) -> tuple[bytes, list[str]]:
@@ -175,52 +141,6 @@ def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[byt
     return pickle.dumps(run, PICKLE_PROTOCOL), outline
 
 
-def render(
-    name: str,
-    prepared: Fetch,
-    source_name: str,
-    appearance: Fetch,
-    folder: Path,
-    chunks: Sequence[tuple[int, Path, str]],
-    with_sheet: bool,
-) -> list[tuple[int, str]]:
-    """Render chunks to finished segments.
-
-    Args:
-        name, source_name: Tell the prepared run and the appearance from others that are kept warm.
-        chunks: Index, a temporary path, and the segment's name in `folder`.
-    Returns: Index and digest of each segment.
-    Raises: InputError for a driver that is damaged or changed; RenderError; OutputError.
-    """
-    from motion_transfer.cores import core_count
-    from motion_transfer.media.publish import explain_disk_errors
-    from motion_transfer.media.work import publish_piece
-    from motion_transfer.render.engine import ContactSheet, Engine
-
-    run: Prepared = WARM.get(f"run {name}", lambda: pickle.loads(prepared()))
-    renderer: Renderer = WARM.get(
-        f"renderer {source_name} {run.recipe}",
-        lambda: run.recipe.renderer(pickle.loads(appearance())),
-    )
-    reader = WARM.get(f"reader {run.driver}", run.driver.open)
-    digests: list[tuple[int, str]] = []
-    pieces = {index: folder / piece for index, _, piece in chunks}
-
-    def finish(chunk: Chunk, path: Path) -> None:
-        digests.append((chunk.index, publish_piece(path, pieces[chunk.index])))
-
-    engine = Engine(
-        run,
-        reader=_SharedFrames(reader, run.driver),
-        renderer=renderer,
-        sheet=ContactSheet(folder, len(run.plan.frames)) if with_sheet else None,
-    )
-    with explain_disk_errors(folder):
-        wanted = [(run.plan.chunks[index], path) for index, path, _ in chunks]
-        engine.render(wanted, core_count(), finish)
-    return digests
-
-
 def assemble(
     options: RenderOptions, prepared: Fetch, folder: Path, pictures: Path
 ) -> tuple[Path, bool]:
@@ -241,27 +161,3 @@ def assemble(
         finished = join(options, run, folder, sheet)
     posters = write_posters(options.source[0], finished, pictures)
     return finished, posters
-
-
-class _SharedFrames:
-    """A reader that keeps a chunk's frames, so that jobs that share a driver share its decoding."""
-
-    def __init__(self, reader: IuvReader, file: DriverFile) -> None:
-        self._reader = reader
-        self._file = file
-        self.stream = reader.stream
-
-    def read(self, start: int, stop: int) -> Iterator[np.ndarray]:
-        """Read frames start..stop-1, see `IuvReader.read`."""
-        wanted = (self._file, start, stop)
-        if WARM.frames[0] == wanted:
-            yield from WARM.frames[1]
-            return
-        if (stop - start) * self._reader.height * self._reader.width * 3 > KEPT_FRAMES_BYTES:
-            yield from self._reader.read(start, stop)
-            return
-        frames: list[np.ndarray] = []
-        for iuv in self._reader.read(start, stop):
-            frames.append(iuv)
-            yield iuv
-        WARM.frames = (wanted, frames)

@@ -25,6 +25,7 @@ from motion_transfer.media.output.audio import AudioCut, choose_audio
 from motion_transfer.media.output.formats import OutputFormat, choose_format
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.render.content import chunk_key, run_key
+from motion_transfer.render.crew import Crew
 from motion_transfer.render.driver import DriverFile, DriverScan, scan_driver
 from motion_transfer.render.inputs import appearance_files, audio_files
 from motion_transfer.render.options import (
@@ -75,17 +76,19 @@ def compose(
     listener: Listener,
     *,
     scanned: Callable[[DriverScan], object] = lambda _scan: None,
+    crew: Crew | None = None,
 ) -> Composed:
     """Take every step from options to a prepared run.
 
     Args:
         folder: Where the IUV of a driver is kept that is raw pictures.
         scanned: Called as soon as the driver was looked through, which may have taken long.
+        crew: Processes that help to look through it.
     Raises: InputError and its kinds.
     """
     read_format(options)  # now, as the photos: to find a driver's people may take long
     check_photos(options)
-    scan = scan_driver(options, folder, listener, workers=options.worker_count)
+    scan = scan_driver(options, folder, listener, workers=options.worker_count, crew=crew)
     scanned(scan)
     plan = plan_run(options, scan)
     options = settle_weights(options, listener)

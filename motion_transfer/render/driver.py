@@ -21,9 +21,17 @@ from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.people import is_motion
+from motion_transfer.render.crew import Crew, result_of
 from motion_transfer.render.inputs import motion_files
 from motion_transfer.render.options import InputOptions
-from motion_transfer.render.plan import SeenFrame, frame_range, scan_people
+from motion_transfer.render.plan import (
+    CHUNK_FRAMES,
+    SeenFrame,
+    frame_range,
+    look_through,
+    scan_people,
+)
+from motion_transfer.render.workers import WARM
 
 if TYPE_CHECKING:
     from motion_transfer.render.picture_driver import PictureDriver
@@ -166,13 +174,19 @@ def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driv
 
 
 def scan_driver(
-    options: InputOptions, folder: Path, listener: Listener, *, workers: int
+    options: InputOptions,
+    folder: Path,
+    listener: Listener,
+    *,
+    workers: int,
+    crew: Crew | None = None,
 ) -> DriverScan:
     """Open a driver and decode its chosen frames once.
 
     Args:
         folder: Where the IUV of pictures is kept.
         workers: Threads that decode.
+        crew: Processes that take it off them as they begin.
     Raises: InputError, also for a driver that changes meanwhile; IuvFileError naming the frame that
         is broken.
     """
@@ -183,15 +197,29 @@ def scan_driver(
         if warning := blends.warn(f"driver {options.driver}"):
             listener(Notice(warning))
     listener(Stage("scan", len(chosen)))
+    crew = crew or Crew()
+    crew.begin(min(workers, -(-len(chosen) // CHUNK_FRAMES)), len(chosen))
+
+    def elsewhere(block: range) -> list[SeenFrame] | None:
+        looking = crew.offer(_look, driver.file, block, driver.pictures is not None)
+        return looking and result_of(looking)
+
     seen = scan_people(
         driver.reader,
         chosen,
         workers,
         lambda count: listener(FramesDone(count)),
         find=driver.people_in,
+        elsewhere=elsewhere,
     )
     driver.inputs.check()
     return driver.scan_of(chosen, seen)
+
+
+def _look(file: DriverFile, frames: range, as_one: bool) -> list[SeenFrame]:
+    """Look through a stretch of a driver in another process, see `Driver.people_in`."""
+    reader = WARM.get(f"reader {file}", file.open)
+    return look_through(reader, frames, take_as_one if as_one else find_people)
 
 
 def _are_pictures(options: InputOptions) -> bool:

@@ -10,10 +10,11 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -32,6 +33,8 @@ from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
 
 CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's batches are on the way
 
+STOP_SECONDS = 0.2  # how soon a thread that waits for another process heeds a stop
+
 SHEET_FRAMES, SHEET_COLUMNS = 12, 4
 THUMBNAIL_PX = 320  # the longer side: twelve of them fit a screen
 
@@ -42,8 +45,20 @@ class StoppedError(Exception):
     """A thread gives up its chunk because the run is being stopped."""
 
 
+class Helpers(Protocol):
+    """Who renders chunks for an engine's threads, elsewhere; called by any of them."""
+
+    def begin(self, chunk: Chunk) -> Future[Any] | None:
+        """Have a chunk rendered; None if nobody is free."""
+        ...
+
+    def finish(self, chunk: Chunk, future: Future[Any]) -> None:
+        """Take a chunk's segment over. Raises: what rendering it raised."""
+        ...
+
+
 class Engine:
-    """Renders chunks of one prepared run in this process."""
+    """Renders chunks of one prepared run in this process, and with helpers in others."""
 
     def __init__(
         self,
@@ -53,6 +68,7 @@ class Engine:
         renderer: Renderer,
         sheet: ContactSheet | None = None,
         listener: Listener = ignore,
+        helpers: Helpers | None = None,
     ) -> None:
         self._prepared = prepared
         self._plan = prepared.plan
@@ -60,6 +76,7 @@ class Engine:
         self._renderer = renderer
         self._sheet = sheet
         self._listener = listener
+        self._helpers = helpers
         self._drawers: ThreadPoolExecutor | None = None
         self._ahead = 0  # batches of a chunk on their way, beyond the one that is wanted next
         self._stop = threading.Event()
@@ -103,6 +120,13 @@ class Engine:
     def _render_chunk(
         self, chunk: Chunk, path: Path, finished: Callable[[Chunk, Path], None]
     ) -> None:
+        if self._helpers is not None and (future := self._helpers.begin(chunk)) is not None:
+            while wait([future], timeout=STOP_SECONDS).not_done:
+                if self._stop.is_set():
+                    raise StoppedError
+            self._helpers.finish(chunk, future)
+            self._listener(FramesDone(chunk.stop - chunk.start))
+            return
         with open_segment(
             path,
             self._prepared.output_format,

@@ -32,6 +32,9 @@ SCAN_FRAMES = 16  # a thread reads at a time: seeking in a video costs the decod
 LISTED_STRETCHES = 10
 
 
+Find = Callable[[UInt8[np.ndarray, "H W 3"]], People]
+
+
 class FrameReader(Protocol):
     """What is asked of a driver while it is rendered; an `IuvReader` is one."""
 
@@ -155,19 +158,22 @@ def scan_people(
     workers: int,
     done: Callable[[int], None],
     *,
-    find: Callable[[UInt8[np.ndarray, "H W 3"]], People] = find_people,
+    find: Find = find_people,
+    elsewhere: Callable[[range], list[SeenFrame] | None] = lambda _block: None,
 ) -> list[SeenFrame]:
     """Find everybody in each frame, decoded in parallel; only boxes and digests are kept.
 
     Args:
+        workers: Threads.
         find: Finds the people of a frame.
+        elsewhere: Has a stretch looked through by somebody else; None if nobody is there.
     """
 
     def scan(start: int) -> list[SeenFrame]:
         block = range(start, min(start + SCAN_FRAMES, frames.stop))
-        found = [
-            SeenFrame(find(iuv), digest_of_iuv(iuv)) for iuv in reader.read(block.start, block.stop)
-        ]
+        found = elsewhere(block)
+        if found is None:
+            found = look_through(reader, block, find)
         done(len(found))
         return found
 
@@ -178,6 +184,13 @@ def scan_people(
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+def look_through(reader: IuvReader, frames: range, find: Find) -> list[SeenFrame]:
+    """Look once at each frame of a stretch. Raises: IuvFileError naming the broken frame."""
+    return [
+        SeenFrame(find(iuv), digest_of_iuv(iuv)) for iuv in reader.read(frames.start, frames.stop)
+    ]
 
 
 def plan_path(

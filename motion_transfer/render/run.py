@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import pickle
 import time
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+from motion_transfer.drawing.renderers import DRAFT
 from motion_transfer.errors import OutputError
 from motion_transfer.events import (
     Finished,
@@ -25,8 +31,10 @@ from motion_transfer.media.publish import (
     publish,
     work_folder,
 )
-from motion_transfer.media.work import WorkFolder, digest_file, key_of, was_published
+from motion_transfer.media.work import WorkFolder, digest_file, key_of, publish_piece, was_published
+from motion_transfer.render.chunks import PICKLE_PROTOCOL, render
 from motion_transfer.render.composition import Composed, Prepared, compose, read_format
+from motion_transfer.render.crew import Crew, result_of
 from motion_transfer.render.driver import DriverScan
 from motion_transfer.render.engine import ContactSheet, Engine
 from motion_transfer.render.options import OutputOptions, RenderOptions
@@ -71,11 +79,15 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
     began = time.perf_counter()
     read_format(options)  # before anything is made beside an output that cannot be
     check_destinations(options)
-    with WorkFolder(options.output, restart=options.restart) as work:
-        composed = prepare(options, work, listener)
+    with (
+        WorkFolder(options.output, restart=options.restart) as work,
+        # a network's calls take long, and leave the lock of Python's threads alone
+        Crew(work.temporary("crew") if options.renderer == DRAFT else None) as crew,
+    ):
+        composed = prepare(options, work, listener, crew)
         prepared = composed.prepared
         render_began = time.perf_counter()
-        _render(options, composed, work, listener, options.worker_count)
+        _render(options, composed, work, listener, crew)
     ended = time.perf_counter()
     plan, (width, height) = prepared.plan, prepared.canvas.size
     report = RenderReport(
@@ -114,14 +126,16 @@ def check_destinations(options: OutputOptions) -> None:
         check_destination(path, force=options.force or ours)
 
 
-def prepare(options: RenderOptions, work: WorkFolder, listener: Listener) -> Composed:
+def prepare(
+    options: RenderOptions, work: WorkFolder, listener: Listener, crew: Crew | None = None
+) -> Composed:
     """Do everything that comes before the first frame. Raises: InputError and its kinds."""
 
     def keep(scan: DriverScan) -> None:
         if scan.pictures is not None:  # so that their folder stays if the run is stopped
             work.note(scan.pictures.iuv.name, scan.pictures.digest, scan.pictures.key)
 
-    return compose(options, work.path, listener, scanned=keep)
+    return compose(options, work.path, listener, scanned=keep, crew=crew)
 
 
 def missing_chunks(prepared: Prepared, work: WorkFolder) -> list[Chunk]:
@@ -172,8 +186,47 @@ def assemble(
     return finished
 
 
+class _ChunkTasks:
+    """Chunks of one run as tasks of its crew."""
+
+    def __init__(
+        self,
+        options: OutputOptions,
+        composed: Composed,
+        work: WorkFolder,
+        crew: Crew,
+        note: Callable[[Chunk, str], None],
+    ) -> None:
+        """Hand out what they need. Args: note: Told of a finished chunk and its digest."""
+        self._options = options
+        self._note = note
+        self._prepared = composed.prepared
+        self._work = work
+        self._crew = crew
+        blobs = {"run": composed.prepared, "appearance": composed.appearance}
+        self._blobs = [
+            crew.share(name, partial(pickle.dumps, blob, PICKLE_PROTOCOL))
+            for name, blob in blobs.items()
+        ]
+
+    def begin(self, chunk: Chunk) -> Future[Any] | None:
+        run, appearance = self._blobs
+        piece = piece_of(self._prepared, chunk)
+        return self._crew.offer(
+            render,
+            *("", run, "", appearance, self._work.path, self._options.output),
+            [(chunk.index, self._work.temporary(piece), piece)],
+            self._options.sheet is not None,
+            False,
+        )
+
+    def finish(self, chunk: Chunk, future: Future[Any]) -> None:
+        [(_, digest)] = result_of(future)
+        self._note(chunk, digest)
+
+
 def _render(
-    options: OutputOptions, composed: Composed, work: WorkFolder, listener: Listener, workers: int
+    options: RenderOptions, composed: Composed, work: WorkFolder, listener: Listener, crew: Crew
 ) -> None:
     prepared = composed.prepared
     key = output_key(prepared)
@@ -193,22 +246,26 @@ def _render(
     listener(Stage("render", frame_count))
     listener(FramesDone(done))
 
-    def finish(chunk: Chunk, path: Path) -> None:
+    def note(chunk: Chunk, digest: str) -> None:
         nonlocal done
-        work.finish(piece_of(prepared, chunk), path, prepared.chunk_keys[chunk.index])
+        work.note(piece_of(prepared, chunk), digest, prepared.chunk_keys[chunk.index])
         done += chunk.stop - chunk.start
 
-    engine = Engine(
-        prepared,
-        reader=prepared.driver.open(),
-        renderer=prepared.recipe.renderer(composed.appearance),
-        sheet=sheet,
-        listener=listener,
-    )
+    def finish(chunk: Chunk, path: Path) -> None:
+        note(chunk, publish_piece(path, work.path / piece_of(prepared, chunk)))
+
     chunks = [(chunk, work.temporary(piece_of(prepared, chunk))) for chunk in missing]
     try:
         with explain_disk_errors(options.output):
-            engine.render(chunks, workers, finish)
+            engine = Engine(
+                prepared,
+                reader=prepared.driver.open(),
+                renderer=prepared.recipe.renderer(composed.appearance),
+                sheet=sheet,
+                listener=listener,
+                helpers=_ChunkTasks(options, composed, work, crew, note),
+            )
+            engine.render(chunks, options.worker_count, finish)
             finished = assemble(options, prepared, work.path, sheet)
             work.publish(finished, key)
     except BaseException as error:

@@ -8,6 +8,7 @@ import shutil
 import signal
 import sys
 import threading
+from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -16,13 +17,28 @@ from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Protocol
 
-from motion_transfer.batch.tasks import Fetch
 from motion_transfer.cores import core_count, take_share
 from motion_transfer.drawing.engines import has_cuda
 
 ORPHANED = 3  # exit code of a worker whose scheduler is gone
+
+PRELOADED = [
+    "motion_transfer.render.composition",
+    "motion_transfer.render.engine",
+    "motion_transfer.media.output.video",
+]
+"""What workers need is imported once, in the process that they are forked from: each then begins
+within 10 ms, not half a second. None of it has threads yet that a fork would lose."""
+
+KEPT_OBJECTS = 16  # of a few jobs at once: run, renderer and reader of each
+
+Fetch = Callable[[], bytes]
+"""Gives a blob, wherever it lies; what `Workers.share` returns."""
+
+BEGINNING = threading.Lock()  # one worker at a time: what is set for it is the whole process's
 
 
 class Workers(Protocol):
@@ -58,9 +74,14 @@ class LocalWorkers:
 
     lost_error: tuple[type[BaseException], ...] = (BrokenProcessPool,)
 
-    def __init__(self, count: int, scratch: Path) -> None:
-        """Start nobody yet; empty `scratch`, the folder for blobs, which `stop` removes."""
+    def __init__(self, count: int, scratch: Path, *, share_gpus: bool = True) -> None:
+        """Start nobody yet; empty `scratch`, the folder for blobs, which `stop` removes.
+
+        Args:
+            share_gpus: Whether workers take GPUs in turn, for which they import torch.
+        """
         self.count = count
+        self._share_gpus = share_gpus
         self._scratch = scratch
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True, mode=0o700)
@@ -74,13 +95,15 @@ class LocalWorkers:
                 return pool.submit(task, *arguments)
             except BrokenProcessPool:
                 pool.shutdown(wait=False)
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(PRELOADED)
         pool = self._pools[place] = ProcessPoolExecutor(
             1,
-            mp_context=multiprocessing.get_context("spawn"),
+            mp_context=context,
             initializer=begin_worker,
-            initargs=(place, self.count, sys.path),
+            initargs=(place, self.count, sys.path, self._share_gpus),
         )
-        with _deaf():
+        with BEGINNING, _deaf(), _without_main():
             future = pool.submit(task, *arguments)
         # the worker has its own; with this one open, half a result of a worker that was killed
         # would be waited for without end
@@ -104,17 +127,38 @@ class LocalWorkers:
         shutil.rmtree(self._scratch, ignore_errors=True)
 
 
-def begin_worker(place: int, count: int, path: list[str]) -> None:
+def begin_worker(place: int, count: int, path: list[str], share_gpus: bool) -> None:
     """Settle into a worker process: its share of the cores, its GPU, an end with its parent."""
     sys.path[:] = path
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # whatever the command's own handler does
     threading.Thread(target=_follow_parent, daemon=True).start()
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     take_share(max(1, core_count() // count))
-    if has_cuda():
+    if share_gpus and has_cuda():
         import torch
 
         torch.cuda.set_device(place % torch.cuda.device_count())
+
+
+class Warm:
+    """What a worker process keeps between tasks; the oldest goes first."""
+
+    def __init__(self) -> None:
+        self._objects: OrderedDict[str, Any] = OrderedDict()
+        self.frames: tuple[Any, list[Any]] = (None, [])
+
+    def get(self, name: str, make: Callable[[], Any]) -> Any:
+        """Give the object of a name; make it if it is not there."""
+        if name not in self._objects:
+            self._objects[name] = make()
+            while len(self._objects) > KEPT_OBJECTS:
+                self._objects.popitem(last=False)
+        self._objects.move_to_end(name)
+        return self._objects[name]
+
+
+WARM = Warm()
+"""Kept by this worker process."""
 
 
 @contextmanager
@@ -125,6 +169,21 @@ def _deaf() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Keep processes that begin inside from running the caller's script, as they would by default.
+
+    Tasks are functions of this package; and a script that calls `render_video` without asking for
+    its own `__name__` would call it again in every worker.
+    """
+    before = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = before
 
 
 def _follow_parent() -> None:

@@ -14,14 +14,16 @@ from typing import Any
 import pytest
 import yaml
 
-from motion_transfer.batch import events, tasks
+from motion_transfer.batch import events
 from motion_transfer.batch.report import write_report
 from motion_transfer.batch.run import Batch, count_jobs, read_batch
 from motion_transfer.batch.schedule import Scheduler, Tally
 from motion_transfer.batch.signals import Signals
 from motion_transfer.drawing.renderers.texture import TextureRecipe
 from motion_transfer.media.work import work_path
+from motion_transfer.render import chunks
 from motion_transfer.render.plan import CHUNK_FRAMES
+from motion_transfer.render.workers import Fetch, Warm
 
 Hook = Callable[[str, int], None]
 
@@ -51,7 +53,7 @@ class InlineWorkers:
         self.calls[task.__name__] += 1
         return future
 
-    def share(self, name: str, blob: bytes) -> tasks.Fetch:
+    def share(self, name: str, blob: bytes) -> Fetch:
         return lambda: blob
 
     def forget(self, name: str) -> None: ...
@@ -103,7 +105,7 @@ def run(studio, monkeypatch) -> Callable[..., Run]:
         before: Hook = lambda _name, _number: None,
         **fields: Any,
     ) -> Run:
-        monkeypatch.setattr(tasks, "WARM", tasks.Warm())
+        monkeypatch.setattr(chunks, "WARM", Warm())
         path = studio.folder / "shoot.yaml"
         defaults = {"renderer": "texture", **fields.pop("defaults", {})}
         content = {"version": 1, "output_root": "out", "defaults": defaults, **fields}

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from processes import die_in_mid_result
 
-from motion_transfer.batch.workers import LocalWorkers
+from motion_transfer.render.workers import LocalWorkers
 
 
 def test_workers_hear_no_ctrl_c_and_are_replaced(tmp_path: Path) -> None:

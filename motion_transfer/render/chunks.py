@@ -1,0 +1,102 @@
+"""Chunks rendered by a worker process.
+
+A prepared run and an appearance come as blobs, and are opened once. Libraries are imported by the
+functions that need them: whoever only hands tasks around imports this module, too.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motion_transfer.render.workers import WARM, Fetch
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from motion_transfer.drawing.renderers.interface import Renderer
+    from motion_transfer.media.iuv.stream import IuvReader
+    from motion_transfer.render.composition import Prepared
+    from motion_transfer.render.driver import DriverFile
+    from motion_transfer.render.plan import Chunk
+
+KEPT_FRAMES_BYTES = 256 << 20
+"""A worker keeps the decoded frames of its last chunk, for the next source with that driver."""
+
+PICKLE_PROTOCOL = 5  # large arrays are not copied on their way
+
+
+def render(
+    name: str,
+    prepared: Fetch,
+    source_name: str,
+    appearance: Fetch,
+    folder: Path,
+    output: Path,
+    chunks: Sequence[tuple[int, Path, str]],
+    with_sheet: bool,
+    keep_frames: bool,
+) -> list[tuple[int, str]]:
+    """Render chunks to finished segments.
+
+    Args:
+        name, source_name: Tell the prepared run and the appearance from others that are kept warm.
+        output: What they are for, for messages.
+        chunks: Index, a temporary path, and the segment's name in `folder`.
+        keep_frames: Whether the next call may want the same driver's frames.
+    Returns: Index and digest of each segment.
+    Raises: InputError for a driver that is damaged or changed; RenderError; OutputError.
+    """
+    from motion_transfer.cores import core_count
+    from motion_transfer.media.publish import explain_disk_errors
+    from motion_transfer.media.work import publish_piece
+    from motion_transfer.render.engine import ContactSheet, Engine
+
+    run: Prepared = WARM.get(f"run {name}", lambda: pickle.loads(prepared()))
+    renderer: Renderer = WARM.get(
+        f"renderer {source_name} {run.recipe}",
+        lambda: run.recipe.renderer(pickle.loads(appearance())),
+    )
+    reader = WARM.get(f"reader {run.driver}", run.driver.open)
+    digests: list[tuple[int, str]] = []
+    pieces = {index: folder / piece for index, _, piece in chunks}
+
+    def finish(chunk: Chunk, path: Path) -> None:
+        digests.append((chunk.index, publish_piece(path, pieces[chunk.index])))
+
+    engine = Engine(
+        run,
+        reader=_SharedFrames(reader, run.driver) if keep_frames else reader,
+        renderer=renderer,
+        sheet=ContactSheet(folder, len(run.plan.frames)) if with_sheet else None,
+    )
+    with explain_disk_errors(output):
+        wanted = [(run.plan.chunks[index], path) for index, path, _ in chunks]
+        engine.render(wanted, core_count(), finish)
+    return digests
+
+
+class _SharedFrames:
+    """A reader that keeps a chunk's frames, so that jobs that share a driver share its decoding."""
+
+    def __init__(self, reader: IuvReader, file: DriverFile) -> None:
+        self._reader = reader
+        self._file = file
+        self.stream = reader.stream
+
+    def read(self, start: int, stop: int) -> Iterator[np.ndarray]:
+        """Read frames start..stop-1, see `IuvReader.read`."""
+        wanted = (self._file, start, stop)
+        if WARM.frames[0] == wanted:
+            yield from WARM.frames[1]
+            return
+        if (stop - start) * self._reader.height * self._reader.width * 3 > KEPT_FRAMES_BYTES:
+            yield from self._reader.read(start, stop)
+            return
+        frames: list[np.ndarray] = []
+        for iuv in self._reader.read(start, stop):
+            frames.append(iuv)
+            yield iuv
+        WARM.frames = (wanted, frames)
