@@ -12,6 +12,10 @@ from onnx import TensorProto, helper, numpy_helper
 
 OPSET, IR_VERSION = 17, 8  # the oldest that has all that is used: GridSample is of 16
 
+TABLE_BYTES = 1 << 16
+"""Constants from this size on may be shared. OpenVINO (2026.4) finds convolutions of 8 bits only
+where each of them has its own scales and zeros."""
+
 FLOAT, UINT8 = TensorProto.FLOAT, TensorProto.UINT8
 INT32, INT64 = TensorProto.INT32, TensorProto.INT64
 
@@ -31,7 +35,8 @@ class Graph:
 
     def __init__(self) -> None:
         self._nodes: list[onnx.NodeProto] = []
-        self._constants: dict[bytes, onnx.TensorProto] = {}
+        self._constants: list[onnx.TensorProto] = []
+        self._tables: dict[bytes, str] = {}
         self._inputs: list[onnx.ValueInfoProto] = []
         self._outputs: list[onnx.ValueInfoProto] = []
 
@@ -43,15 +48,16 @@ class Graph:
         return output
 
     def constant(self, value: float | np.ndarray) -> str:
-        """Hold an array, as it is, or a number, as float32; equal ones are held once."""
-        array = value if isinstance(value, np.ndarray) else np.array(value, np.float32)
-        array = np.array(array, order="C")
-        kind = f"{array.dtype.str}{array.shape}".encode()
-        content = kind + xxhash.xxh3_128_digest(array.data)  # some are tables of 16 MB
-        if content not in self._constants:
-            name = f"constant_{len(self._constants)}"
-            self._constants[content] = numpy_helper.from_array(array, name)
-        return self._constants[content].name
+        """Hold an array, as it is, or a number, as float32; equal tables are held once."""
+        array = np.array(value, None if isinstance(value, np.ndarray) else np.float32, order="C")
+        name = f"constant_{len(self._constants)}"
+        if array.nbytes >= TABLE_BYTES:
+            content = f"{array.dtype.str}{array.shape}".encode()
+            content += xxhash.xxh3_128_digest(array.data)
+            if (known := self._tables.setdefault(content, name)) != name:
+                return known
+        self._constants.append(numpy_helper.from_array(array, name))
+        return name
 
     def input(self, name: str, kind: int, shape: Sequence[int | str]) -> str:
         """Declare an input; sizes that are words are open."""
@@ -81,7 +87,7 @@ class Graph:
             notes: Its metadata.
         """
         read = {name for node in self._nodes for name in node.input}
-        constants = [held for held in self._constants.values() if held.name in read]
+        constants = [held for held in self._constants if held.name in read]
         graph = helper.make_graph(
             self._nodes, name, self._inputs, self._outputs, initializer=constants
         )

@@ -128,10 +128,15 @@ def look_up(graph: Graph, feature_map: str, iuv: str) -> tuple[str, str]:
 
 def _find_places(graph: Graph, iuv: str) -> str:
     """Where each pixel lies in the texture, (x, y), 1 x H x W x 2; the background is part 1's."""
-    # in 16 bits, as the table is kept: half of what there is to load
-    charts = (load_uv_tables().charts * WORD).round().astype(np.uint16).reshape(-1, 2)
-    words = graph("Gather", charts, _chart_rows(graph, iuv), axis=0)
-    return graph("Div", graph("Cast", words, to=FLOAT), WORD)
+    # the table is of 16-bit words, which graphics processors do not know: as bytes, low and high
+    words = (load_uv_tables().charts * WORD).round().astype(np.uint16).reshape(-1, 2)
+    table = np.concatenate([words & 255, words >> 8], axis=1).astype(np.uint8)
+    found = graph("Cast", graph("Gather", table, _chart_rows(graph, iuv), axis=0), to=FLOAT)
+    low, high = (
+        graph("Slice", found, *(np.array([number]) for number in (first, first + 2, 3)))
+        for first in (0, 2)
+    )
+    return graph("Div", graph("Add", low, graph("Mul", high, 256)), WORD)
 
 
 def _chart_rows(graph: Graph, iuv: str) -> str:
