@@ -15,10 +15,10 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from motion_transfer.errors import InputError
-from motion_transfer.weights.checkpoint import CheckpointInfo, read_ranges
 
 if TYPE_CHECKING:
     from motion_transfer.drawing.engines.interface import Engine
+    from motion_transfer.weights.checkpoint import CheckpointInfo
 
 PRECISIONS = ("int8", "bf16", "f32")
 """The fastest first."""
@@ -111,6 +111,8 @@ def choose_execution(wish: Wish, info: CheckpointInfo) -> Execution:
 
     Raises: InputError for what this machine, or the checkpoint, cannot.
     """
+    from motion_transfer.weights.checkpoint import read_ranges
+
     device = wish.device or _best_device(wish.engine)
     name = wish.engine or ("torch" if device != "cpu" else _best_cpu_engine())
     row = ENGINES[name]
