@@ -30,6 +30,7 @@ COMMANDS = {
     "models": "The networks that find people in raw pictures: fetch them.",
     "eval": "Score renderers, and other methods' pictures, on the same pairs.",
     "calibrate": "Let a checkpoint's network be computed in 8 bits, twice as fast.",
+    "export": "Write the networks as ONNX, OpenVINO or TensorRT files, for other programs.",
     "iuv": "IUV from photos and videos; convert IUV between formats, repair it.",
     "inspect": "Say what an IUV file, driver, photo or weights file holds.",
     "info": "Versions, device, renderers, sizes of a run; part names.",

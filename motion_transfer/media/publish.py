@@ -10,7 +10,7 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -45,9 +45,22 @@ def extend_name(name: str, ending: str) -> str:
     return os.fsdecode(encoded) + ending
 
 
-def check_destination(path: Path, *, force: bool) -> None:
+def is_frame(item: Path) -> bool:
+    """Tell whether something in a folder is a frame of a folder of frames, by its name."""
+    return item.suffix == ".png" and item.stem.isdecimal()
+
+
+def check_destination(
+    path: Path,
+    *,
+    force: bool,
+    belongs: Callable[[Path], bool] = is_frame,
+    content: str = "frames",
+) -> None:
     """Refuse a destination before any work is done.
 
+    Args:
+        belongs: Tells what a folder may hold that is replaced; `content` is that in words.
     Raises: OutputError if it exists and `force` is off, if its name is none, or if its folder
         cannot be written.
     """
@@ -57,12 +70,10 @@ def check_destination(path: Path, *, force: bool) -> None:
         if path.exists() and not force:
             raise OutputError(f"{path} exists already; choose another name or add --force")
         # a mistyped name is not to cost somebody a folder of other things
-        if path.is_dir() and any(
-            item.suffix != ".png" or not item.stem.isdecimal() for item in path.iterdir()
-        ):
+        if path.is_dir() and not all(map(belongs, path.iterdir())):
             raise OutputError(
-                f"{path} is a folder with other things than frames in it, and is not replaced even"
-                " with --force; choose another name"
+                f"{path} is a folder with other things than {content} in it, and is not replaced"
+                " even with --force; choose another name"
             )
         parent = path.absolute().parent
         existing = next(folder for folder in (parent, *parent.parents) if folder.exists())

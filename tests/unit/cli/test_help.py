@@ -29,6 +29,7 @@ PATIENCE_SECONDS = 1.5  # it takes 0.2 on an idle machine
         ["demo", "-h"],
         ["info", "-h"],
         ["eval", "-h"],
+        ["export", "-h"],
         ["iuv", "repair", "-h"],
         ["iuv", "estimate", "-h"],
     ],

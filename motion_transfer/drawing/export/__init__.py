@@ -1,0 +1,1 @@
+"""A checkpoint as files that other programs run: ONNX, OpenVINO's, TensorRT's."""
