@@ -18,8 +18,9 @@ from typing import Any, Self, TypeVar
 from motion_transfer.errors import RenderError
 from motion_transfer.render.workers import Fetch, LocalWorkers
 
-LEAST_FRAMES = 600
-"""Of fewer frames, threads have made half when processes begin: see `benchmarks/end_to_end.py`."""
+LEAST_SHARED = 3000
+"""Frames times the other processes, from which they are worth their 0.6 s of one core: measured
+with two at 256 x 256. The more threads there are, the more of their time goes by waiting."""
 
 LOST = "a worker process was killed, perhaps for want of memory; try fewer --workers"
 
@@ -51,7 +52,7 @@ class Crew:
 
     def begin(self, count: int, frame_count: int) -> None:
         """Begin processes for a run of so many frames, if they are worth it; do not wait."""
-        if self._scratch is None or count < 2 or frame_count < LEAST_FRAMES:
+        if self._scratch is None or frame_count * (count - 1) < LEAST_SHARED:
             return
         with suppress(OSError):  # where nothing can be written, the run itself says so
             self._workers = LocalWorkers(count, self._scratch, share_gpus=False)

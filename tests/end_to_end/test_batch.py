@@ -258,11 +258,17 @@ def test_a_worker_that_is_killed_fails_nothing_at_first(studio, shoot: Path) -> 
 
 
 def workers_of(pid: int) -> list[int]:
-    """Worker processes of a batch; not Python's own resource tracker."""
-    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    """Worker processes of a batch: they are forked from another child of it."""
     return [
-        c for c in map(int, children) if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()
+        worker
+        for child in children_of(pid)
+        if b"forkserver" in Path(f"/proc/{child}/cmdline").read_bytes()
+        for worker in children_of(child)
     ]
+
+
+def children_of(pid: int) -> list[int]:
+    return [int(c) for c in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
 def test_ctrl_c_finishes_running_chunks(studio, shoot: Path) -> None:

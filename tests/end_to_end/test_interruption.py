@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from processes import members, wait_until_gone
 
 from motion_transfer.media.work import work_path
 
@@ -31,7 +33,12 @@ def start(studio, *more: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "motion_transfer", *map(str, arguments)]
     pipe = subprocess.PIPE
     return subprocess.Popen(
-        command, stdout=pipe, stderr=pipe, text=True, preexec_fn=heed_interrupts
+        command,
+        stdout=pipe,
+        stderr=pipe,
+        text=True,
+        preexec_fn=heed_interrupts,
+        start_new_session=True,
     )
 
 
@@ -78,6 +85,21 @@ def test_nothing_half_written_is_left(
     assert {path.name for path in left} <= {"journal.jsonl", "lock", "owner.json"}
     assert not left or kept
     assert not list(work.glob("*.part-*"))
+
+
+def test_nobody_outlives_a_run_that_is_killed(studio) -> None:
+    with start(studio, "--workers", 3) as process:
+        wait_for(process, "render")
+        session = os.getsid(process.pid)
+        assert len(members(session)) > 3  # itself, and three at least that help
+        process.kill()
+        process.wait(60)
+    wait_until_gone(session)
+    again = studio.folder / "new/out.mp4"
+    with start(studio, "--workers", 3, "--frames", ":200") as process:
+        process.communicate(timeout=300)
+    assert process.returncode == 0
+    assert list(again.parent.iterdir()) == [again]
 
 
 def test_an_older_output_survives(studio) -> None:
