@@ -8,7 +8,8 @@ Prints medians of interleaved rounds, and lowest to highest; all sections if non
   alone with threads and processes.
 * `lite`, `paper` (random weights): frames per second of `mt run` in 8 and in 16 bits, from the
   command to its end and while rendering, and the time a frame over that of the network alone, which
-  draws the same frames by as many threads as there are cores.
+  draws the same frames by as many threads as there are cores. Of CPU time the whole command counts,
+  start and loading included.
 * `start`: `mt --help`, and from `mt run` to the first frame that is written.
 """
 
@@ -17,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -48,11 +50,12 @@ MAIN = "from motion_transfer.cli.main import entry_point; entry_point()"
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds of one command: in all, to its first written frame, and while rendering."""
+    """Seconds of one command: in all, to its first written frame, while rendering, of all cores."""
 
     whole: float
     first: float
     rendering: float
+    cpu: float
 
 
 def time_run(
@@ -64,6 +67,7 @@ def time_run(
     words += ["--json", "--workers", len(chosen), *more]
     command = COMMAND if processes else (sys.executable, "-c", f"{THREADS_ONLY}\n{MAIN}")
     began, stage, first, rendering = time.perf_counter(), "", 0.0, 0.0
+    cpu_began = cpu_of_children()
     with subprocess.Popen(
         [*command, *map(str, words)],
         stdout=subprocess.PIPE,
@@ -81,7 +85,13 @@ def time_run(
                 rendering = event["render_seconds"]
     if process.returncode:
         raise SystemExit(f"mt run failed: {process.returncode}")
-    return Timing(time.perf_counter() - began, first, rendering)
+    return Timing(time.perf_counter() - began, first, rendering, cpu_of_children() - cpu_began)
+
+
+def cpu_of_children() -> float:
+    """CPU seconds of the commands that have ended; without those of a draft's processes."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def draft(folder: Path, frame_count: int, rounds: int, processes: list[bool]) -> None:
@@ -114,22 +124,26 @@ def network(folder: Path, weights: Path, frame_count: int, rounds: int) -> None:
             timing = time_run(driver, folder, *words)
             seconds[precision, "whole"].append(timing.whole)
             seconds[precision, "rendering"].append(timing.rendering)
-            alone = time_network(driver, folder, weights, precision)
+            seconds[precision, "cpu"].append(timing.cpu)
+            alone, cpu = time_network(driver, folder, weights, precision)
             seconds[precision, "network"].append(alone)
+            seconds[precision, "network cpu"].append(cpu)
     print(f"{weights.stem}, 256 x 256, {frame_count} PNG frames, {core_count()} cores:")
     for precision in PRECISIONS:
-        whole, rendering, alone = (
-            seconds[precision, kind] for kind in ("whole", "rendering", "network")
+        whole, rendering, alone, cpu, network_cpu = (
+            seconds[precision, kind]
+            for kind in ("whole", "rendering", "network", "cpu", "network cpu")
         )
         print(
             f"  {precision} {spread([frame_count / each for each in whole])} frames/s in all,"
             f" {spread([frame_count / each for each in rendering])} while rendering; over the"
-            f" network alone {over(whole, alone):.2f} and {over(rendering, alone):.2f}"
+            f" network alone {over(whole, alone):.2f} and {over(rendering, alone):.2f},"
+            f" in CPU time {over(cpu, network_cpu):.2f}"
         )
 
 
-def time_network(driver: Path, folder: Path, weights: Path, precision: str) -> float:
-    """Draw a run's frames and do nothing else; seconds."""
+def time_network(driver: Path, folder: Path, weights: Path, precision: str) -> tuple[float, float]:
+    """Draw a run's frames and do nothing else; seconds, and CPU seconds."""
     options = RenderOptions(
         source=(SOURCE,),
         driver=driver,
@@ -149,10 +163,10 @@ def time_network(driver: Path, folder: Path, weights: Path, precision: str) -> f
     batches = crops.reshape(-1, step, *crops.shape[1:])
     renderer.render(batches[0])
     with ThreadPoolExecutor(core_count()) as pool:
-        began = time.perf_counter()
+        began, cpu_began = time.perf_counter(), time.process_time()
         for _ in pool.map(renderer.render, batches):
             pass
-        return time.perf_counter() - began
+        return time.perf_counter() - began, time.process_time() - cpu_began
 
 
 def start_up(folder: Path, rounds: int) -> None:
