@@ -33,8 +33,8 @@ import numpy as np
 
 from motion_transfer.cores import core_count
 from motion_transfer.estimate.blazepose import BlazePoseEstimator
-from motion_transfer.estimate.clip import AT_ONCE, lay_iuv
-from motion_transfer.estimate.interface import PersonEstimate
+from motion_transfer.estimate.clip import lay_iuv
+from motion_transfer.estimate.interface import AT_ONCE, PersonEstimate
 from motion_transfer.estimate.shots import mark_shots
 from motion_transfer.media.iuv.writing import IuvOutput, write_iuv
 from motion_transfer.media.pictures.formats import open_pictures
@@ -199,8 +199,7 @@ def time_steps(clip: Path, folder: Path) -> None:
 
     frames = step("decode", lambda: list(islice(pictures.read(), count)))
     step("look for cuts", lambda: list(mark_shots(frames)))
-    estimator.estimate(frames[0])
-    estimator.start_shot()
+    estimator.estimate(frames[0])  # a shot's first frame is searched everywhere, for 0.3 s
     located = step("find people", lambda: [estimator.locate(frame) for frame in frames])
     people = step("paint IUV", lambda: [finish() for finish in located])
     size = frames[0].shape[:2]

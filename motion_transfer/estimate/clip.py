@@ -22,6 +22,7 @@ from motion_transfer.drawing.person import EVERYBODY, Box, Follower
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.ahead import read_ahead, work_ahead
 from motion_transfer.estimate.interface import (
+    AT_ONCE,
     Estimator,
     Finish,
     Landmarks,
@@ -33,10 +34,6 @@ from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.repair.gaps import fill_gaps
 
 AHEAD_FRAMES = 4  # a few, so that a slow frame of one thread does not stop the others
-
-AT_ONCE = 2
-"""How many frames are finished at once, see `StagedEstimator`. Measured: BlazePose takes as long to
-find somebody, which is done frame after frame, as the IUV takes to be painted."""
 
 NOBODY = 255  # higher than anybody's number, so that the lowest number around a pixel is a person
 MOST_PEOPLE = NOBODY - 1  # in a frame; those after them are left out

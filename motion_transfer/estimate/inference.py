@@ -23,16 +23,18 @@ class CpuNetwork:
 
     Args:
         model: A file, or a graph.
+        at_once: How many inferences may run at the same time, each compiled for when it first is;
+            more take turns.
     Raises: InputError if the file is no model.
     """
 
-    def __init__(self, model: Path | onnx.ModelProto) -> None:
-        threads = core_count()
+    def __init__(self, model: Path | onnx.ModelProto, *, at_once: int = 1) -> None:
+        threads = min(at_once, core_count())
         settings = {
             # measured: in bfloat16 landmarks are 2 px off, some 13, and the IUV network, which
             # would take 8 instead of 13 ms, flickers more (0.23 % of pixels instead of 0.20)
             "INFERENCE_PRECISION_HINT": "f32",
-            "NUM_STREAMS": threads,  # one thread each: more inferences at the same time take turns
+            "NUM_STREAMS": threads,  # of a thread each
             "INFERENCE_NUM_THREADS": threads,
             # or several networks, which know nothing of each other, sit on the same core
             "ENABLE_CPU_PINNING": False,

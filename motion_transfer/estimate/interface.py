@@ -17,6 +17,10 @@ from jaxtyping import Float32, UInt8
 from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError
 
+AT_ONCE = 2
+"""How many frames are finished at once, see `StagedEstimator`. Measured: BlazePose takes as long to
+find somebody, which is done frame after frame, as the IUV takes to be painted."""
+
 SIDES = ("left", "right")
 _PAIRED = (
     *("shoulder", "elbow", "wrist", "pinky", "index", "thumb"),

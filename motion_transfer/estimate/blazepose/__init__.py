@@ -17,7 +17,7 @@ from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
 from motion_transfer.estimate.inference import CpuNetwork, open_network
-from motion_transfer.estimate.interface import Finish, PersonEstimate, check_frame
+from motion_transfer.estimate.interface import AT_ONCE, Finish, PersonEstimate, check_frame
 from motion_transfer.estimate.iuv.body import MASK_SIZE, body_arrays, body_window
 from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
@@ -53,7 +53,8 @@ class BlazePoseEstimator:
         fit: BodyFit | None = None,
     ) -> None:
         with ThreadPoolExecutor() as threads:  # each takes a quarter of a second
-            network = threads.submit(_open_painter, weights)
+            painter = partial(_open_painter, weights) if weights else _open_shipped
+            network = threads.submit(painter)
             for _ in threads.map(open_network, map(find_model, MODEL_FILES)):
                 pass  # the tracker finds them open
         self._network = network.result()
@@ -108,12 +109,11 @@ class BlazePoseEstimator:
 
 @cache
 def _open_shipped() -> CpuNetwork:
-    return CpuNetwork(build_graph(find_shipped()))
+    return _open_painter(find_shipped())
 
 
-def _open_painter(weights: Path | None) -> CpuNetwork:
-    """Open the network that paints IUV; that of the package, once a process."""
-    return CpuNetwork(build_graph(weights)) if weights else _open_shipped()
+def _open_painter(weights: Path) -> CpuNetwork:
+    return CpuNetwork(build_graph(weights), at_once=AT_ONCE)
 
 
 def model_facts(_model: None = None) -> dict[str, Any]:

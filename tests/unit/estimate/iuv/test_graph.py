@@ -62,7 +62,7 @@ def test_bytes_do_not_depend_on_how_many_run(monkeypatch: pytest.MonkeyPatch) ->
     found = []
     for cores in (1, 2, 3):
         monkeypatch.setattr("motion_transfer.cores._share", cores)
-        network = CpuNetwork(build_graph(shipped_file()))
+        network = CpuNetwork(build_graph(shipped_file()), at_once=3)
         for threads in (1, 3):
             with ThreadPoolExecutor(threads) as pool:
                 found.append(list(pool.map(lambda body: network.run(*body)[0].tobytes(), people)))  # noqa: B023
