@@ -19,6 +19,7 @@ from motion_transfer.drawing.export import run
 from motion_transfer.drawing.export.options import FORMATS
 from motion_transfer.drawing.export.tensorrt_plan import simplify
 from motion_transfer.drawing.graphs.whole import build_painter, build_sampler
+from motion_transfer.version import __version__
 from motion_transfer.weights.checkpoint import RANGES, copy_with_notes, read_checkpoint
 from motion_transfer.weights.checkpoint import inspect_checkpoint as inspect
 
@@ -142,7 +143,7 @@ def test_files_say_what_they_are(exported: Path, ranged: Path) -> None:
         "weights": "ranged.safetensors",
         "weights_sha256": digest,
         "licence": "CC0",
-        "exported_by": "motion-transfer 0.1.0",
+        "exported_by": f"motion-transfer {__version__}",
     }
     for name in NETWORKS:
         model = onnx.load(exported / f"{name}.onnx")
