@@ -135,8 +135,8 @@ def network(folder: Path, weights: Path, frame_count: int, rounds: int) -> None:
             for kind in ("whole", "rendering", "network", "cpu", "network cpu")
         )
         print(
-            f"  {precision} {spread([frame_count / each for each in whole])} frames/s in all,"
-            f" {spread([frame_count / each for each in rendering])} while rendering; over the"
+            f"  {precision} {spread([frame_count / each for each in whole], 1)} frames/s in all,"
+            f" {spread([frame_count / each for each in rendering], 1)} while rendering; over the"
             f" network alone {over(whole, alone):.2f} and {over(rendering, alone):.2f},"
             f" in CPU time {over(cpu, network_cpu):.2f}"
         )
