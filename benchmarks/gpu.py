@@ -60,7 +60,7 @@ def main() -> None:
 def network_alone(weights: Path, preset: str) -> None:
     began = time.perf_counter()
     engine = open_engine(weights, CUDA)
-    engine.prepare(SIDE)
+    engine.prepare([SIDE])
     ready_seconds = time.perf_counter() - began
     batch = engine.batch_size(SIDE)
     crops = demo_crops(SIDE)[:batch]

@@ -83,7 +83,7 @@ def compare(weights: Path, size: int, rounds: int) -> None:
     for form in FORMS:
         began = time.perf_counter()
         engine = open_engine(weights, Execution(*form, "cpu"))
-        engine.prepare(size)
+        engine.prepare([size])
         ready[form] = time.perf_counter() - began
         if form == BASIS:
             config = engine.config

@@ -88,16 +88,19 @@ def compose(
     """
     read_format(options)  # now, as the photos: to find a driver's people may take long
     check_photos(options)
-    scan = scan_driver(options, folder, listener, workers=options.worker_count, crew=crew)
-    scanned(scan)
-    plan = plan_run(options, scan)
-    options = settle_weights(options, listener)
-    inputs = Inputs(appearance_files(options))
-    recipe = open_recipe(options)
-    with ThreadPoolExecutor(1) as beside:  # either keeps a core busy
-        ready = beside.submit(recipe.make_ready, [shot.window.side for shot in plan.shots])
+    with ThreadPoolExecutor(2) as beside:  # what can be made ready is, while files are read
+        ready = [] if options.adapt else [beside.submit(open_recipe(options).make_ready, ())]
+        scan = scan_driver(options, folder, listener, workers=options.worker_count, crew=crew)
+        scanned(scan)
+        plan = plan_run(options, scan)
+        options = settle_weights(options, listener)
+        inputs = Inputs(appearance_files(options))
+        recipe = open_recipe(options)
+        sides = [shot.window.side for shot in plan.shots]
+        ready.append(beside.submit(recipe.make_ready, sides))
         source = read_source(options, recipe.texture_size, listener)
-        ready.result()
+        for each in ready:
+            each.result()
     for note in source.notes:
         listener(Notice(note))
     prepared = prepare_run(options, scan, plan, recipe, source, inputs, listener)

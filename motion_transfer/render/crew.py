@@ -19,8 +19,8 @@ from motion_transfer.errors import RenderError
 from motion_transfer.render.workers import Fetch, LocalWorkers
 
 LEAST_SHARED = 3000
-"""Frames times the other processes, from which they are worth their 0.6 s of one core: measured
-with two at 256 x 256. The more threads there are, the more of their time goes by waiting."""
+"""Frames times the other processes, from which they may be worth their 0.6 s of one core. Of two,
+neither kind was seen to be faster; the more threads share a lock, the longer each waits for it."""
 
 LOST = "a worker process was killed, perhaps for want of memory; try fewer --workers"
 

@@ -180,8 +180,7 @@ def test_weights(studio, inputs, begin, moment: str, checkpoint: Path) -> None:
     weights, other = studio.folder / "a.safetensors", studio.folder / "b.safetensors"
     shutil.copy(checkpoint, weights)
     other_weights(checkpoint, other)
-    network._open_model.cache_clear()
-    network._open_network.cache_clear()
+    network._load_network.cache_clear()
     begin(
         *(moment, weights, partial(replace, weights, other)),
         renderer="nhrr",
@@ -204,7 +203,7 @@ def other_weights(checkpoint: Path, path: Path) -> None:
     with safetensors.safe_open(checkpoint, framework="pt") as file:
         state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         metadata = file.metadata()
-    state = {name: -t if t.is_floating_point() else t for name, t in state.items()}
+    state = {name: -t if name.endswith("weight") else t for name, t in state.items()}
     safetensors.torch.save_file(state, path, metadata=metadata)
 
 

@@ -199,11 +199,11 @@ def test_shots_have_their_own_windows(tmp_path: Path, red: dict, me: Path, size:
     if size == "driver":
         assert abs(painted(pictures[0])[0] - near.left) <= 3
         assert abs(painted(pictures[9])[0] - far.left) <= 3
-    else:  # both fill their squares of 128 and 64 px, of which the larger is shown
-        assert len(pictures[0]) == 128
+    else:  # both fill their squares of 104 and 56 px, of which the larger is shown
+        assert len(pictures[0]) == 104
         heights = [np.ptp(np.flatnonzero((p.min(-1) < 128).any(1))) for p in pictures]
         assert min(heights[:5]) > 0.95 * (near.bottom - near.top)
-        assert min(heights[5:]) > 0.95 * 2 * (far.bottom - far.top)
+        assert min(heights[5:]) > 0.95 * 104 / 56 * (far.bottom - far.top)
 
 
 def test_the_source_ends_where_alpha_does(red_model: Path, me: Path) -> None:

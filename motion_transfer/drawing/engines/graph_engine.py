@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
@@ -57,7 +57,8 @@ class GraphEngine(ABC):
         whole = execution.precision == "int8"
         self._ranges = read_ranges(inspect_checkpoint(weights)) if whole else None
         self._painters: dict[int, Session] = {}
-        self._opening = threading.Lock()
+        self._opened_encoder: Session | None = None
+        self._opening, self._opening_encoder = threading.Lock(), threading.Lock()
 
     @abstractmethod
     def open(
@@ -82,12 +83,18 @@ class GraphEngine(ABC):
         inputs = {name: np.ascontiguousarray(array[None]) for name, array in named.items()}
         return self._encoder.run(inputs)
 
-    @cached_property
-    def _encoder(self) -> Session:
-        return self.open(build_encoder(self.config, self._tensors), {}, exact=True)
+    def prepare(self, sides: Collection[int]) -> None:
+        for side in sides:
+            self._painter(side)
+        _ = self._encoder
 
-    def prepare(self, side: int) -> None:
-        _ = self._painter(side), self._encoder
+    @property
+    def _encoder(self) -> Session:
+        with self._opening_encoder:  # beside painters
+            if self._opened_encoder is None:
+                model = build_encoder(self.config, self._tensors)
+                self._opened_encoder = self.open(model, {}, exact=True)
+        return self._opened_encoder
 
     def take(self, feature_map: FeatureMap) -> FeatureMap:
         return np.ascontiguousarray(feature_map)

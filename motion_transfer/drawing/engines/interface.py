@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -39,8 +40,8 @@ class Engine(Protocol):
         """Compute a source's feature map, the same bits for any number of threads."""
         ...
 
-    def prepare(self, side: int) -> None:
-        """Make ready for crops of that side, px."""
+    def prepare(self, sides: Collection[int]) -> None:
+        """Make ready for sources, and for crops of those sides, px."""
         ...
 
     def take(self, feature_map: FeatureMap) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from copy import deepcopy
 from pathlib import Path
 from queue import Queue
@@ -77,8 +77,8 @@ class TorchEngine:
     def encode(self, source: Source) -> FeatureMap:
         return encode_source(self._model, source).numpy()
 
-    def prepare(self, side: int) -> None:
-        if self._on_cuda:
+    def prepare(self, sides: Collection[int]) -> None:
+        for side in sides if self._on_cuda else ():
             self._lanes_of(side)
 
     def take(self, feature_map: FeatureMap) -> Tensor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
@@ -23,6 +24,7 @@ from motion_transfer.errors import WeightsError
 from motion_transfer.weights.checkpoint import digest_weights, inspect_checkpoint
 
 MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leave the IUV
+OPENING = threading.Lock()  # of networks, by a run's several threads
 KEPT_NETWORKS = 8  # a process keeps so many warm: as many as anybody compares side by side
 
 
@@ -70,9 +72,7 @@ class NetworkRecipe:
         return drawn_side(window_side, inspect_checkpoint(self.weights).config)
 
     def make_ready(self, window_sides: Collection[int]) -> None:
-        engine = _open_network(self)
-        for side in {self.working_size(side) for side in window_sides}:
-            engine.prepare(side)
+        _open_network(self).prepare({self.working_size(side) for side in window_sides})
 
     def appearance_of(self, source: Source) -> Appearance:
         if source.kept is not None:
@@ -96,9 +96,14 @@ def open_recipe(weights: Path, wish: Wish) -> NetworkRecipe:
     return NetworkRecipe(weights, digest_weights(weights), how)
 
 
-@lru_cache(maxsize=KEPT_NETWORKS)
 def _open_network(recipe: NetworkRecipe) -> Engine:
-    """Load a checkpoint. Raises: WeightsError if its digest is another by now."""
+    """Load a checkpoint, once. Raises: WeightsError if its digest is another by now."""
+    with OPENING:
+        return _load_network(recipe)
+
+
+@lru_cache(maxsize=KEPT_NETWORKS)
+def _load_network(recipe: NetworkRecipe) -> Engine:
     engine = open_engine(recipe.weights, recipe.how)
     if digest_weights(recipe.weights) != recipe.content:
         raise WeightsError(

@@ -29,6 +29,7 @@ class Slow:
     """Paints the IUV, after a while; knows how many calls there were at a time, and by whom."""
 
     name = "slow"
+
     def __init__(self, occupies: Occupied, *, fails_at: int = -1) -> None:
         self.occupies: Occupied = occupies
         self.calls = 0
