@@ -14,6 +14,7 @@ import onnx
 import openvino
 
 from motion_transfer.cores import core_count
+from motion_transfer.drawing.engines.openvino_engine import compile_graph, open_core
 from motion_transfer.errors import InputError
 from motion_transfer.media.quiet import quiet_libraries
 
@@ -30,22 +31,14 @@ class CpuNetwork:
 
     def __init__(self, model: Path | onnx.ModelProto, *, at_once: int = 1) -> None:
         threads = min(at_once, core_count())
-        settings = {
-            # measured: in bfloat16 landmarks are 2 px off, some 13, and the IUV network, which
-            # would take 8 instead of 13 ms, flickers more (0.23 % of pixels instead of 0.20)
-            "INFERENCE_PRECISION_HINT": "f32",
-            "NUM_STREAMS": threads,  # of a thread each
-            "INFERENCE_NUM_THREADS": threads,
-            # or several networks, which know nothing of each other, sit on the same core
-            "ENABLE_CPU_PINNING": False,
-        }
-        core = openvino.Core()
         graph = (
-            _read(core, model)
+            _read(model)
             if isinstance(model, Path)
-            else core.read_model(model.SerializeToString())
+            else open_core().read_model(model.SerializeToString())
         )
-        self._compiled = core.compile_model(graph, "CPU", settings)
+        # measured: in bfloat16 landmarks are 2 px off, some 13, and the IUV network, which would
+        # take 8 instead of 13 ms, flickers more (0.23 % of pixels instead of 0.20)
+        self._compiled = compile_graph(graph, "f32", threads, threads=threads)
         self._own = threading.local()
 
     def run(self, *inputs: np.ndarray) -> list[np.ndarray]:
@@ -72,10 +65,10 @@ def open_network(file: Path) -> CpuNetwork:
     return CpuNetwork(file)
 
 
-def _read(core: openvino.Core, file: Path) -> openvino.Model:
+def _read(file: Path) -> openvino.Model:
     try:
         with quiet_libraries():  # the readers of other formats say why it is none of theirs
-            return core.read_model(file)
+            return open_core().read_model(file)
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1]
         raise InputError(

@@ -20,7 +20,7 @@ EXACT = "f32"
 
 def fast_precisions(_device: str) -> list[str]:
     """List the precisions that this CPU is fast in."""
-    told = _core().get_property("CPU", "OPTIMIZATION_CAPABILITIES")
+    told = open_core().get_property("CPU", "OPTIMIZATION_CAPABILITIES")
     return [name for name, word in (("int8", "INT8"), ("bf16", "BF16")) if word in told] + [EXACT]
 
 
@@ -35,26 +35,35 @@ class OpenVinoEngine(GraphEngine):
     def open(
         self, model: onnx.ModelProto, sizes: Mapping[str, tuple[int, ...]], *, exact: bool
     ) -> Session:
-        graph = _core().read_model(model.SerializeToString())
+        graph = open_core().read_model(model.SerializeToString())
         if sizes:
             graph.reshape({name: list(size) for name, size in sizes.items()})
-        half = not exact and self.execution.precision != EXACT
-        threads = core_count()
-        settings = {
-            # what is left of 8 bits is computed in 16 where that is fast
-            "INFERENCE_PRECISION_HINT": _half() if half else EXACT,
-            # calls side by side are as fast as two threads in one call, and any number of workers
-            # gives the same bits; what is called once is done soonest by all threads
-            "NUM_STREAMS": 1 if exact else threads,
-            "INFERENCE_NUM_THREADS": threads,
-            "ENABLE_CPU_PINNING": False,
-        }
-        names = [output.name for output in model.graph.output]
-        return Session(_core().compile_model(graph, "CPU", settings), names)
+        # what is left of 8 bits is computed in 16 where that is fast
+        half = not exact and self.execution.precision != EXACT and "bf16" in fast_precisions("cpu")
+        # calls side by side are as fast as two threads in one call, and any number of workers gives
+        # the same bits; what is called once is done soonest by all threads
+        at_once = 1 if exact else core_count()
+        compiled = compile_graph(graph, "bf16" if half else EXACT, at_once, threads=core_count())
+        return Session(compiled, [output.name for output in model.graph.output])
 
 
-def _half() -> str:
-    return "bf16" if "bf16" in fast_precisions("cpu") else EXACT
+def compile_graph(
+    graph: openvino.Model, precision: str, at_once: int, *, threads: int
+) -> openvino.CompiledModel:
+    """Make a graph ready on this CPU.
+
+    Args:
+        at_once: How many calls may run at the same time; more take turns.
+        threads: Of all of them together.
+    """
+    settings = {
+        "INFERENCE_PRECISION_HINT": precision,
+        "NUM_STREAMS": at_once,
+        "INFERENCE_NUM_THREADS": threads,
+        # or several graphs, or processes, which know nothing of each other, sit on the same core
+        "ENABLE_CPU_PINNING": False,
+    }
+    return open_core().compile_model(graph, "CPU", settings)
 
 
 class Session:
@@ -88,5 +97,6 @@ class Session:
 
 
 @cache
-def _core() -> openvino.Core:
+def open_core() -> openvino.Core:
+    """Open OpenVINO, once for the whole process."""
     return openvino.Core()

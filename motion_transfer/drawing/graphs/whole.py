@@ -122,7 +122,7 @@ def build_sampler(config: ModelConfig) -> onnx.ModelProto:
     graph = Graph()
     _map_input(graph, config)
     iuv = _iuv_input(graph)
-    features = _append_sampler(graph, config, iuv, outline=None)
+    features, _ = _append_sampler(graph, config, iuv, outline=None, starts_frames=False)
     graph.output(FEATURES, features, FLOAT, (1, config.render_inputs, "height", "width"))
     return graph.build("sampler")
 
@@ -154,9 +154,9 @@ def build_painter(
     if outline_given and config.geometry:
         distance = graph.input(DISTANCE, FLOAT, (1, 1, "height", "width"))
         outline = distance, graph.input(UNIT, FLOAT, (1, 1, 1, 1))
-    features = _append_sampler(graph, config, iuv, outline=outline)
+    features, colours = _append_sampler(graph, config, iuv, outline=outline, starts_frames=True)
     drawn, read = append_render_net(graph, features, weights, config, ranges)
-    frame = _blend(graph, drawn, features, config)
+    frame = drawn if colours is None else _blend(graph, drawn, colours, config)
     levels = graph("Mul", graph("Add", frame, 1), 127.5)
     rows = graph("Clip", graph("Round", graph("Transpose", levels, perm=[0, 2, 3, 1])), 0, 255)
     shape = (1, "height", "width", config.render_outputs)
@@ -176,12 +176,20 @@ def _iuv_input(graph: Graph) -> str:
 
 
 def _append_sampler(
-    graph: Graph, config: ModelConfig, iuv: str, *, outline: tuple[str, str] | None
-) -> str:
+    graph: Graph,
+    config: ModelConfig,
+    iuv: str,
+    *,
+    outline: tuple[str, str] | None,
+    starts_frames: bool,
+) -> tuple[str, str | None]:
     """Append the feature image.
 
     Args:
         outline: Distance to it, and the unit of clearance, where they are given.
+        starts_frames: Whether the colours that frames start from are wanted as well, which are
+            carried beyond the body in one go with what RenderNet is told there.
+    Returns: The image; and those colours, where a model has them.
     """
     sampled, body = look_up(graph, FEATURE_MAP, iuv)
     learned, end = config.feature_outputs, config.map_channels
@@ -200,28 +208,29 @@ def _append_sampler(
         codes = graph("Cast", graph("Transpose", iuv, perm=[0, 3, 1, 2]), to=FLOAT)
         scale = np.array([2 / PART_COUNT, 2 / 255, 2 / 255], np.float32)[:, None, None]
         image.append(graph("Sub", graph("Mul", codes, scale), 1))
+    told = POSITION_CHANNELS + int(config.clearance)
+    carried: list[str] = []  # beyond the body's outline
     if config.geometry:
-        nearest.append(graph.part(sampled, end - POSITION_CHANNELS, end))
-        channels = POSITION_CHANNELS + int(config.clearance)
-        image.append(spread_colours(graph, graph.join(*nearest), body, MARGIN_LEVELS, channels))
+        carried += [*nearest, graph.part(sampled, end - POSITION_CHANNELS, end)]
+    colours = None
+    if starts_frames and config.colour_shortcut:
+        colours = graph("Clip", graph.part(sampled, 0, COLOUR_CHANNELS), -1, 1)
+        carried += [colours] if config.colour_margin else []
+    if carried:
+        channels = told * config.geometry + COLOUR_CHANNELS * (colours in carried)
+        beyond = spread_colours(graph, graph.join(*carried), body, MARGIN_LEVELS, channels)
+        if config.geometry:
+            image.append(graph.part(beyond, 0, told))
+        if colours in carried:
+            colours = graph.part(beyond, channels - COLOUR_CHANNELS, channels)
+    if config.geometry:
         distance = signed_distance(graph, body, OUTLINE_PIXELS) if outline is None else outline[0]
         image.append(graph("Mul", distance, 1 / UNIT_PIXELS))
-    return graph.join(*image)
+    return graph.join(*image), colours
 
 
-def _blend(graph: Graph, drawn: str, features: str, config: ModelConfig) -> str:
-    """Append what makes the frame of a drawing, see `NeuralReRenderer.blend`."""
-    if not config.colour_shortcut:
-        return drawn
-    colours = graph("Clip", graph.part(features, 0, COLOUR_CHANNELS), -1, 1)
-    if config.colour_margin:
-        if config.geometry:
-            distance = graph.part(features, config.render_inputs - 1, config.render_inputs)
-            body = graph("Less", distance, 0)
-        else:
-            body = graph("Greater", graph("ReduceMax", graph("Abs", features), axes=[1]), 0)
-        body = graph("Cast", body, to=FLOAT)
-        colours = spread_colours(graph, colours, body, MARGIN_LEVELS, COLOUR_CHANNELS)
+def _blend(graph: Graph, drawn: str, colours: str, config: ModelConfig) -> str:
+    """Append what makes a frame of a drawing, see `NeuralReRenderer.blend`."""
     # twice: tanh lies in [-1, 1], the difference of two colours in [-2, 2]
     painted = graph("Mul", graph.part(drawn, 0, COLOUR_CHANNELS), 2)
     blended = graph("Clip", graph("Add", colours, painted), -1, 1)
