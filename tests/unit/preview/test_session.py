@@ -181,7 +181,7 @@ def test_views_of_the_source(options: RenderOptions, open_session, checkpoint: P
     assert picture(session.ask_still("texture").result()).shape == (64, 64, 3)
     assert picture(session.ask_still("map").result()).shape == (64, 64, 3)
     features = picture(session.ask_frame(3, "features", session.key).result())
-    assert features.shape == (128, 128, 3), "the crop, as large as it is drawn"
+    assert features.shape == (112, 112, 3), "the crop, as large as it is drawn"
     assert (features[0, 0] == 255).all()
 
 

@@ -176,7 +176,7 @@ def test_windows_of_about_the_image_size_are_not_scaled(paint_pairs) -> None:
     path = paint_pairs(1)
     target = open_pairs(path)[0].target.load()
     window = person_window(target)
-    size = round(window.side / 1.2 / 16) * 16
+    size = round(window.side / 1.1 / 8) * 8
     assert size < window.side
     plain = open_samples(path, image_size=size, jitter=0)[0]
     x, y = (place + (window.side - size) // 2 for place in (window.x, window.y))
