@@ -182,7 +182,7 @@ def test_windows_of_about_the_image_size_are_not_scaled(paint_pairs) -> None:
     x, y = (place + (window.side - size) // 2 for place in (window.x, window.y))
     expected = Window(x, y, size).cut(target.iuv, size)
     assert (plain["target_iuv"].permute(1, 2, 0).numpy() == expected).all()
-    jittered = open_samples(path, image_size=size, jitter=0.3)
+    jittered = open_samples(path, image_size=size, jitter=0.1)
     drawn = [jittered[number]["target_iuv"] for number in range(6)]
     assert len({int((iuv[0] > 0).sum()) for iuv in drawn}) == 1, "moved, not scaled"
     assert len({iuv.numpy().tobytes() for iuv in drawn}) > 3
