@@ -15,6 +15,7 @@ from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.engines import Execution
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
+from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
 from motion_transfer.drawing.graphs.whole import (
     CLEARANCE,
@@ -22,6 +23,7 @@ from motion_transfer.drawing.graphs.whole import (
     FEATURE_MAP,
     FRAME,
     IUV,
+    SAMPLED,
     TEXTURE,
     UNIT,
     VISIBILITY,
@@ -96,20 +98,20 @@ class GraphEngine(ABC):
                 self._opened_encoder = self.open(model, {}, exact=True)
         return self._opened_encoder
 
-    def take(self, feature_map: FeatureMap) -> FeatureMap:
-        return np.ascontiguousarray(feature_map)
+    def take(self, feature_map: FeatureMap) -> FeatureRows:
+        return FeatureRows(feature_map)
 
     def draw(
-        self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "B S S 3"]
+        self, feature_map: FeatureRows, iuv: UInt8[np.ndarray, "B S S 3"]
     ) -> UInt8[np.ndarray, "B S S K"]:
         painter = self._painter(iuv.shape[1])
         frames = [painter.run(self._inputs(feature_map, crop)) for crop in iuv]
         return frames[0] if len(frames) == 1 else np.concatenate(frames)
 
     def feature_image(
-        self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "B S S 3"]
+        self, feature_map: FeatureRows, iuv: UInt8[np.ndarray, "B S S 3"]
     ) -> Float[np.ndarray, "B C S S"]:
-        inputs = ({FEATURE_MAP: feature_map, IUV: crop[None]} for crop in iuv)
+        inputs = ({FEATURE_MAP: feature_map.feature_map, IUV: crop[None]} for crop in iuv)
         return np.concatenate([self._sampler.run(each) for each in inputs])
 
     @cached_property
@@ -120,23 +122,25 @@ class GraphEngine(ABC):
         self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "S S 3"]
     ) -> dict[str, Float[np.ndarray, "1 C H W"]]:
         """Give what each of RenderNet's convolutions reads, by its name, in float32."""
-        outputs = self._tapped.run_all(self._inputs(feature_map, iuv))
+        outputs = self._tapped.run_all(self._inputs(self.take(feature_map), iuv))
         return {name: values for name, values in outputs.items() if name != FRAME}
 
     @cached_property
     def _tapped(self) -> Session:
-        model = build_painter(self.config, self._tensors, outline_given=True, taps=True)
+        model = build_painter(self.config, self._tensors, looked_up=True, taps=True)
         return self.open(model, {}, exact=True)
 
     def _inputs(
-        self, feature_map: FeatureMap, iuv: UInt8[np.ndarray, "S S 3"]
+        self, feature_map: FeatureRows, iuv: UInt8[np.ndarray, "S S 3"]
     ) -> dict[str, np.ndarray]:
-        inputs = {FEATURE_MAP: feature_map, IUV: np.ascontiguousarray(iuv[None])}
-        if self.config.geometry:
-            inputs[DISTANCE] = signed_distance(iuv)[None, None]
-        if self.config.geometry and self.config.clearance:
-            inputs[UNIT] = np.full((1, 1, 1, 1), clearance_unit(iuv), np.float32)
-        return inputs
+        shown = {IUV: np.ascontiguousarray(iuv[None])}
+        if not self.config.geometry:
+            return shown | {FEATURE_MAP: feature_map.feature_map}
+        return shown | {
+            SAMPLED: feature_map.look_up(iuv),
+            DISTANCE: signed_distance(iuv)[None, None],
+            UNIT: np.full((1, 1, 1, 1), clearance_unit(iuv), np.float32),
+        }
 
     def _painter(self, side: int) -> Session:
         with self._opening:
@@ -148,8 +152,9 @@ class GraphEngine(ABC):
 
     def _open_painter(self, side: int) -> Session:
         tensors, ranges = self._tensors, self._ranges
-        model = build_painter(self.config, tensors, ranges=ranges, outline_given=True)
+        model = build_painter(self.config, tensors, ranges=ranges, looked_up=True)
         sizes: dict[str, tuple[int, ...]] = {IUV: (1, side, side, 3)}
         if self.config.geometry:
             sizes[DISTANCE] = (1, 1, side, side)
+            sizes[SAMPLED] = (1, side, side, self.config.map_channels)
         return self.open(model, sizes, exact=False)

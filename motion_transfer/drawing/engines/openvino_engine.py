@@ -37,7 +37,8 @@ class OpenVinoEngine(GraphEngine):
     ) -> Session:
         graph = open_core().read_model(model.SerializeToString())
         if sizes:
-            graph.reshape({name: list(size) for name, size in sizes.items()})
+            named = {port.get_any_name() for port in graph.inputs}
+            graph.reshape({name: list(sizes[name]) for name in named & sizes.keys()})
         # what is left of 8 bits is computed in 16 where that is fast
         half = not exact and self.execution.precision != EXACT and "bf16" in fast_precisions("cpu")
         # calls side by side are as fast as two threads in one call, and any number of workers gives

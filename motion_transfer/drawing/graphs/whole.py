@@ -40,7 +40,8 @@ from nhrr_core.config import (
 from nhrr_core.parts import PART_COUNT
 
 TEXTURE, VISIBILITY, CLEARANCE, FEATURE_MAP = "texture", "visibility", "clearance", "feature_map"
-IUV, DISTANCE, UNIT, FEATURES, FRAME = "iuv", "distance", "unit", "features", "frame"
+IUV, FEATURES, FRAME = "iuv", "features", "frame"
+SAMPLED, DISTANCE, UNIT = "sampled", "distance", "unit"
 
 
 def build_encoder(config: ModelConfig, weights: Weights) -> onnx.ModelProto:
@@ -122,7 +123,7 @@ def build_sampler(config: ModelConfig) -> onnx.ModelProto:
     graph = Graph()
     _map_input(graph, config)
     iuv = _iuv_input(graph)
-    features, _ = _append_sampler(graph, config, iuv, outline=None, starts_frames=False)
+    features, _ = _append_sampler(graph, config, iuv, looked_up=False, starts_frames=False)
     graph.output(FEATURES, features, FLOAT, (1, config.render_inputs, "height", "width"))
     return graph.build("sampler")
 
@@ -132,7 +133,7 @@ def build_painter(
     weights: Weights,
     *,
     ranges: Ranges | None = None,
-    outline_given: bool = False,
+    looked_up: bool = False,
     taps: bool = False,
 ) -> onnx.ModelProto:
     """Build what `NeuralReRenderer.render` computes, from target IUV to a frame of 8 bits.
@@ -142,19 +143,24 @@ def build_painter(
 
     Args:
         ranges: Makes RenderNet's convolutions ones of 8-bit numbers.
-        outline_given: Whether `distance`, 1 x 1 x H x W, and `unit`, 1 x 1 x 1 x 1, are inputs, see
-            `measure_outline`: that is several times as fast as to find them in the graph.
+        looked_up: With `config.geometry`, whether `sampled`, 1 x H x W x D, the feature map as the
+            pixels see it, `distance`, 1 x 1 x H x W, that to the outline, and `unit`,
+            1 x 1 x 1 x 1, that of clearance, are inputs in place of the map: whoever knows where
+            the body is finds them several times as fast as a graph.
         taps: Whether what RenderNet's convolutions read is given out as well, by the names of their
             weights.
     """
     graph = Graph()
-    _map_input(graph, config)
-    iuv = _iuv_input(graph)
-    outline = None
-    if outline_given and config.geometry:
-        distance = graph.input(DISTANCE, FLOAT, (1, 1, "height", "width"))
-        outline = distance, graph.input(UNIT, FLOAT, (1, 1, 1, 1))
-    features, colours = _append_sampler(graph, config, iuv, outline=outline, starts_frames=True)
+    looked_up = looked_up and config.geometry
+    if looked_up:
+        shape = (1, "height", "width", config.map_channels)
+        graph.input(SAMPLED, FLOAT, shape)
+        graph.input(DISTANCE, FLOAT, (1, 1, "height", "width"))
+        graph.input(UNIT, FLOAT, (1, 1, 1, 1))
+    else:
+        _map_input(graph, config)
+    iuv = _iuv_input(graph) if not looked_up or config.variant == "warp-cond" else ""
+    features, colours = _append_sampler(graph, config, iuv, looked_up=looked_up, starts_frames=True)
     drawn, read = append_render_net(graph, features, weights, config, ranges)
     frame = drawn if colours is None else _blend(graph, drawn, colours, config)
     levels = graph("Mul", graph("Add", frame, 1), 127.5)
@@ -180,27 +186,32 @@ def _append_sampler(
     config: ModelConfig,
     iuv: str,
     *,
-    outline: tuple[str, str] | None,
+    looked_up: bool,
     starts_frames: bool,
 ) -> tuple[str, str | None]:
     """Append the feature image.
 
     Args:
-        outline: Distance to it, and the unit of clearance, where they are given.
+        looked_up: See `build_painter`.
         starts_frames: Whether the colours that frames start from are wanted as well, which are
             carried beyond the body in one go with what RenderNet is told there.
     Returns: The image; and those colours, where a model has them.
     """
-    sampled, body = look_up(graph, FEATURE_MAP, iuv)
+    if looked_up:
+        sampled = graph("Transpose", SAMPLED, perm=[0, 3, 1, 2])
+        body = graph("Cast", graph("Less", DISTANCE, 0), to=FLOAT)
+        distance, unit = DISTANCE, UNIT
+    else:
+        sampled, body = look_up(graph, FEATURE_MAP, iuv)
+        distance = signed_distance(graph, body, OUTLINE_PIXELS) if config.geometry else ""
+        unit = ""
     learned, end = config.feature_outputs, config.map_channels
     image = [graph.part(sampled, 0, learned)]
     nearest = []
     if config.clearance:
-        if outline is None:
+        if not looked_up:
             scale = pixels_per_texel(graph, iuv, body)
             unit = graph("Mul", scale, UNIT_TEXELS / UNIT_PIXELS)
-        else:
-            unit = outline[1]
         clearance = graph("Mul", graph.part(sampled, learned, learned + 1), unit)
         image += [clearance, graph.part(sampled, learned + 1, learned + 2)]
         nearest.append(clearance)
@@ -224,7 +235,6 @@ def _append_sampler(
         if colours in carried:
             colours = graph.part(beyond, channels - COLOUR_CHANNELS, channels)
     if config.geometry:
-        distance = signed_distance(graph, body, OUTLINE_PIXELS) if outline is None else outline[0]
         image.append(graph("Mul", distance, 1 / UNIT_PIXELS))
     return graph.join(*image), colours
 

@@ -13,6 +13,7 @@ import torch
 from motion_transfer.drawing.engines import ENGINES, Execution, Wish, choose_execution, open_engine
 from motion_transfer.drawing.engines.graph_engine import GraphEngine
 from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
+from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.outline import pixels_per_texel, signed_distance
 from motion_transfer.drawing.engines.torch_engine import BATCHES, choose_batch
 from motion_transfer.errors import InputError, WeightsError
@@ -117,6 +118,28 @@ def test_calls_side_by_side_draw_the_same(
         ]
     for number, call in enumerate(calls):
         np.testing.assert_array_equal(call.result(), alone[number % 3])
+
+
+@pytest.mark.parametrize("size", [16, 100, 512])
+def test_the_look_up_is_torchs(size: int) -> None:
+    """Of all parts, and of places at the texture's edges."""
+    rng = np.random.default_rng(0)
+    iuv = rng.integers(0, 256, (40, 56, 3), np.uint8)
+    iuv[..., 0] = rng.integers(0, 25, (40, 56))
+    iuv[:4, :, 1:] = rng.choice(np.array([0, 255], np.uint8), (4, 56, 2))
+    feature_map = rng.normal(size=(1, 7, size, size)).astype(np.float32)
+    looked_up = FeatureRows(feature_map).look_up(iuv)
+    expected = sampling.sample_features(
+        torch.from_numpy(feature_map),
+        torch.from_numpy(iuv).permute(2, 0, 1)[None],
+        load_uv_layout().charts,
+    )
+    np.testing.assert_allclose(looked_up, expected.permute(0, 2, 3, 1).numpy(), rtol=0, atol=2e-4)
+
+
+def test_nobody_is_looked_up() -> None:
+    feature_map = np.ones((1, 3, 16, 16), np.float32)
+    assert not FeatureRows(feature_map).look_up(np.zeros((8, 8, 3), np.uint8)).any()
 
 
 def test_the_outline_is_torchs(crops: np.ndarray) -> None:
