@@ -12,8 +12,8 @@ import torch
 
 from motion_transfer.drawing.engines import ENGINES, Execution, Wish, choose_execution, open_engine
 from motion_transfer.drawing.engines.graph_engine import GraphEngine
-from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
 from motion_transfer.drawing.engines.lookup import FeatureRows
+from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
 from motion_transfer.drawing.engines.outline import pixels_per_texel, signed_distance
 from motion_transfer.drawing.engines.torch_engine import BATCHES, choose_batch
 from motion_transfer.errors import InputError, WeightsError
