@@ -3,7 +3,8 @@
 Writes `motion_transfer/weights/NAME.safetensors` in float16, and what the run was into
 `docs/weights/`: its settings as `NAME-N.toml`, its losses as rows of `NAME.csv`, all runs' curves
 as `NAME.png`. A run with an `init` went on from the weights that ship, and is one more; a run
-without replaces them and everything that was written of them.
+without replaces them and everything that was written of them. `mt calibrate NAME` then tells of
+which ranges their numbers are, so that they are computed in 8 bits.
 Needs the `train` extra and matplotlib.
 """
 
