@@ -92,7 +92,14 @@ def read_checkpoint(path: Path) -> tuple[ModelConfig, dict[str, Array]]:
         name: Entry(shape, not name.endswith("num_batches_tracked"))
         for name, shape in list_tensors(config).items()
     }
-    return config, read_tensors(path, wanted, header.state, "weights")
+    tensors = read_tensors(path, wanted, header.state, "weights")
+    for name, values in tensors.items():
+        if name.endswith("running_var") and (values < 0).any():
+            raise WeightsError(
+                f"weights {path} are damaged: {name} holds negative variances; download or export"
+                " again"
+            )
+    return config, tensors
 
 
 def load_checkpoint(path: Path) -> NeuralReRenderer:

@@ -142,13 +142,11 @@ class _CudaLane:
         side: int,
         device: torch.device,
     ) -> None:
-        def pinned(channels: int) -> Tensor:
-            return torch.empty((batch, side, side, channels), dtype=torch.uint8, pin_memory=True)
-
         texels = config.finest_texture
         self._stream = torch.cuda.Stream(device)
         self._shown: Tensor | None = None
-        self._host_iuv, self._host_frames = pinned(IUV_CHANNELS), pinned(config.render_outputs)
+        self._host_iuv = pinned((batch, side, side, IUV_CHANNELS))
+        self._host_frames = pinned((batch, side, side, config.render_outputs))
         self._iuv = torch.zeros_like(self._host_iuv, device=device)
         self._map = torch.zeros((1, config.map_channels, texels, texels), device=device)
         self._graph = torch.cuda.CUDAGraph()
@@ -156,7 +154,9 @@ class _CudaLane:
         with torch.cuda.stream(self._stream):  # as recording asks for: once before, aside
             frames(self._map, self._iuv)
         self._stream.synchronize()
-        with torch.cuda.graph(self._graph, stream=self._stream):
+        # other threads may be drawing crops of another size meanwhile
+        mode = "thread_local"
+        with torch.cuda.graph(self._graph, stream=self._stream, capture_error_mode=mode):
             self._frames = frames(self._map, self._iuv)
 
     def draw(
@@ -173,6 +173,11 @@ class _CudaLane:
             self._host_frames.copy_(self._frames, non_blocking=True)
         self._stream.synchronize()
         return self._host_frames.numpy().copy()
+
+
+def pinned(shape: tuple[int, ...]) -> Tensor:
+    """Take memory for 8-bit numbers from and to which a device copies by itself."""
+    return torch.empty(shape, dtype=torch.uint8, pin_memory=True)
 
 
 def choose_batch(config: ModelConfig, side: int, free_bytes: int) -> int:

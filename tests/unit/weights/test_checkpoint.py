@@ -127,6 +127,9 @@ def spoil(checkpoint: Path, path: Path, kind: str) -> Path:
         metadata["config"] = '{"alpha": true, "alpha": false}'
     elif kind == "values that are no numbers":
         state[name] = torch.full_like(tensor, torch.nan)
+    elif kind == "negative variances":
+        norm = next(name for name in state if name.endswith("running_var"))
+        state[norm] = -torch.ones_like(state[norm])
     elif kind == "whole numbers":
         state[name] = torch.zeros_like(tensor, dtype=torch.int32)
     elif kind == "another configuration":
@@ -162,6 +165,7 @@ UNFIT = [
     ("tensor of another shape", r"is \[1, .*\], not \["),
     ("terabytes", "layers.13.weight is missing"),
     ("values that are no numbers", "holds values that are no finite numbers"),
+    ("negative variances", "running_var holds negative variances"),
     ("whole numbers", "holds another kind of numbers"),
     ("another configuration", r"is \[.*\], not \[.*; \.\.\."),
 ]

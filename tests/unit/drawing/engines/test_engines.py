@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 import torch
 
-from motion_transfer.drawing.engines import ENGINES, Execution, Wish, choose_execution, open_engine
+from motion_transfer.drawing.engines import (
+    ENGINES,
+    Execution,
+    Wish,
+    choose_execution,
+    open_engine,
+    torch_engine,
+)
 from motion_transfer.drawing.engines.graph_engine import GraphEngine
 from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
@@ -240,6 +250,33 @@ def test_batches_divide_a_chunk_and_fit_the_memory() -> None:
     assert sizes == sorted(sizes)
     assert (sizes[0], sizes[-1]) == (1, CHUNK_FRAMES)
     assert choose_batch(config, 512, 16 << 30) < choose_batch(config, 256, 16 << 30)
+
+
+def test_a_lane_draws_the_source_and_the_crops_that_it_is_given(
+    weights: Path, source, crops: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With stand-ins for CUDA, of which a graph that is replayed draws anew."""
+    for name in ("Stream", "CUDAGraph", "synchronize"):
+        monkeypatch.setattr(torch.cuda, name, MagicMock())
+    for name in ("stream", "graph"):
+        monkeypatch.setattr(torch.cuda, name, lambda *_, **__: nullcontext())
+    monkeypatch.setattr(torch_engine, "pinned", partial(torch.empty, dtype=torch.uint8))
+    engine = open_engine(weights, EXACT)
+    assert isinstance(engine, torch_engine.TorchEngine)
+    device = torch.device("cpu")
+    lane = torch_engine._CudaLane(engine._frames, engine.config, len(crops), SIDE, device)
+
+    def replay() -> None:
+        with torch.inference_mode():
+            lane._frames.copy_(engine._frames(lane._map, lane._iuv))
+
+    monkeypatch.setattr(lane._graph, "replay", replay)
+    one = engine.take(engine.encode(source))
+    other = engine.take(np.ascontiguousarray(engine.encode(source)[..., ::-1]))
+    for feature_map, shown in ((one, crops), (one, crops[::-1]), (other, crops), (one, crops)):
+        drawn, expected = lane.draw(feature_map, shown), engine.draw(feature_map, shown.copy())
+        np.testing.assert_array_equal(drawn, expected)
+    assert not np.array_equal(engine.draw(one, crops), engine.draw(other, crops))
 
 
 def test_graph_engines_take_an_image_a_call(weights: Path) -> None:
