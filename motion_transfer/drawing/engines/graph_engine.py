@@ -133,14 +133,12 @@ class GraphEngine(ABC):
     def _inputs(
         self, feature_map: FeatureRows, iuv: UInt8[np.ndarray, "S S 3"]
     ) -> dict[str, np.ndarray]:
-        shown = {IUV: np.ascontiguousarray(iuv[None])}
-        if not self.config.geometry:
-            return shown | {FEATURE_MAP: feature_map.feature_map}
-        return shown | {
-            SAMPLED: feature_map.look_up(iuv),
-            DISTANCE: signed_distance(iuv)[None, None],
-            UNIT: np.full((1, 1, 1, 1), clearance_unit(iuv), np.float32),
-        }
+        inputs = {IUV: np.ascontiguousarray(iuv[None]), SAMPLED: feature_map.look_up(iuv)}
+        if self.config.geometry:
+            inputs[DISTANCE] = signed_distance(iuv)[None, None]
+        if self.config.clearance:
+            inputs[UNIT] = np.full((1, 1, 1, 1), clearance_unit(iuv), np.float32)
+        return inputs
 
     def _painter(self, side: int) -> Session:
         with self._opening:
@@ -153,8 +151,9 @@ class GraphEngine(ABC):
     def _open_painter(self, side: int) -> Session:
         tensors, ranges = self._tensors, self._ranges
         model = build_painter(self.config, tensors, ranges=ranges, looked_up=True)
-        sizes: dict[str, tuple[int, ...]] = {IUV: (1, side, side, 3)}
-        if self.config.geometry:
-            sizes[DISTANCE] = (1, 1, side, side)
-            sizes[SAMPLED] = (1, side, side, self.config.map_channels)
+        sizes = {
+            IUV: (1, side, side, 3),
+            SAMPLED: (1, side, side, self.config.map_channels),
+            DISTANCE: (1, 1, side, side),
+        }
         return self.open(model, sizes, exact=False)

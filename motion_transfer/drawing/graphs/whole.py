@@ -143,20 +143,21 @@ def build_painter(
 
     Args:
         ranges: Makes RenderNet's convolutions ones of 8-bit numbers.
-        looked_up: With `config.geometry`, whether `sampled`, 1 x H x W x D, the feature map as the
-            pixels see it, `distance`, 1 x 1 x H x W, that to the outline, and `unit`,
-            1 x 1 x 1 x 1, that of clearance, are inputs in place of the map: whoever knows where
-            the body is finds them several times as fast as a graph.
+        looked_up: Whether `sampled`, 1 x H x W x D, the feature map as the pixels see it, is an
+            input in place of the map; with `config.geometry` also `distance`, 1 x 1 x H x W, that
+            to the outline, and with `config.clearance` `unit`, 1 x 1 x 1 x 1, what a clearance of 1
+            is in the image. Whoever knows where the body is finds them several times as fast as a
+            graph.
         taps: Whether what RenderNet's convolutions read is given out as well, by the names of their
             weights.
     """
     graph = Graph()
-    looked_up = looked_up and config.geometry
     if looked_up:
-        shape = (1, "height", "width", config.map_channels)
-        graph.input(SAMPLED, FLOAT, shape)
-        graph.input(DISTANCE, FLOAT, (1, 1, "height", "width"))
-        graph.input(UNIT, FLOAT, (1, 1, 1, 1))
+        graph.input(SAMPLED, FLOAT, (1, "height", "width", config.map_channels))
+        if config.geometry:
+            graph.input(DISTANCE, FLOAT, (1, 1, "height", "width"))
+        if config.clearance:
+            graph.input(UNIT, FLOAT, (1, 1, 1, 1))
     else:
         _map_input(graph, config)
     iuv = _iuv_input(graph) if not looked_up or config.variant == "warp-cond" else ""
@@ -199,7 +200,11 @@ def _append_sampler(
     """
     if looked_up:
         sampled = graph("Transpose", SAMPLED, perm=[0, 3, 1, 2])
-        body = graph("Cast", graph("Less", DISTANCE, 0), to=FLOAT)
+        if config.geometry:
+            inside = graph("Less", DISTANCE, 0)
+        else:  # wherever anything is seen
+            inside = graph("Greater", graph("ReduceMax", graph("Abs", sampled), axes=[1]), 0)
+        body = graph("Cast", inside, to=FLOAT)
         distance, unit = DISTANCE, UNIT
     else:
         sampled, body = look_up(graph, FEATURE_MAP, iuv)

@@ -9,6 +9,8 @@ import openvino
 import pytest
 import torch
 
+from motion_transfer.drawing.engines.lookup import FeatureRows
+from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
 from motion_transfer.drawing.graphs.whole import build_encoder, build_painter, build_sampler
 from nhrr_core import ModelConfig, NeuralReRenderer
 
@@ -139,3 +141,22 @@ def test_the_painter_is_torchs(changes: dict[str, Any], iuv: np.ndarray) -> None
         drawn = model.render(feature_map, torch.from_numpy(iuv).permute(0, 3, 1, 2))
     expected = ((drawn + 1) * 127.5).permute(0, 2, 3, 1).numpy()
     assert np.abs(frame - expected).max() < 0.51
+
+
+@each
+def test_the_painter_may_be_given_what_is_looked_up(changes: dict[str, Any]) -> None:
+    model, iuv = make(changes), target(40, 56)
+    config, side = model.config, model.config.finest_texture
+    feature_map = np.random.default_rng(2).normal(size=(1, config.map_channels, side, side))
+    rows = FeatureRows(feature_map.astype(np.float32))
+    inputs = {
+        "feature_map": rows.feature_map,
+        "iuv": iuv,
+        "sampled": rows.look_up(iuv[0]),
+        "distance": signed_distance(iuv[0])[None, None],
+        "unit": np.full((1, 1, 1, 1), clearance_unit(iuv[0]), np.float32),
+    }
+    weights = weights_of(model)
+    (given,) = run(build_painter(config, weights, looked_up=True), inputs)
+    (alone,) = run(build_painter(config, weights), inputs)
+    assert np.abs(given.astype(int) - alone).max() <= 1
