@@ -56,11 +56,15 @@ def _charts() -> Charts:
     return Charts(x, y, torn.reshape(-1))
 
 
+def chart_entries(iuv: UInt8[np.ndarray, "... 3"]) -> Int64[np.ndarray, "*shape"]:
+    """Tell each pixel's entry in the flat tables of charts; the background's is one of part 1."""
+    part, u, v = (iuv[..., channel].astype(np.int64) for channel in range(3))
+    return (np.maximum(part - 1, 0) * CHART_SIZE + v) * CHART_SIZE + u
+
+
 def texture_coordinates(iuv: UInt8[np.ndarray, "... 3"]) -> Float32[np.ndarray, "2 ..."]:
     """Look up where each pixel lies in the texture; undefined where I is 0."""
-    part, u, v = (iuv[..., channel].astype(np.int64) for channel in range(3))
-    entry = (np.maximum(part - 1, 0) * CHART_SIZE + v) * CHART_SIZE + u
-    charts = _charts()
+    charts, entry = _charts(), chart_entries(iuv)
     return np.stack([charts.x.take(entry), charts.y.take(entry)])
 
 
@@ -226,5 +230,6 @@ def unfold_clearance(
 def pixels_per_texel(iuv: UInt8[np.ndarray, "H W 3"]) -> float:
     """Measure how large a body is in its image: the side of a texel of CLEARANCE_SIZE, px."""
     body = iuv[iuv[..., 0] > 0]
-    texels = np.unique(texel_index(texture_coordinates(body), CLEARANCE_SIZE))
-    return (len(body) / len(texels)) ** 0.5 if len(body) else 1.0
+    hit = np.zeros(CLEARANCE_SIZE**2, bool)
+    hit[texel_index(texture_coordinates(body), CLEARANCE_SIZE)] = True
+    return (len(body) / np.count_nonzero(hit)) ** 0.5 if len(body) else 1.0

@@ -34,9 +34,9 @@ class EngineRow:
     Attributes:
         name: What options and reports call it.
         package: The library that has to be installed.
-        opener: `module:function`, which opens it for a checkpoint and an `Execution`.
-        precisions: What it can multiply in; whether a machine is fast at it, `fast_precisions` of
-            the same module tells.
+        module: Whose `open_engine` opens it for a checkpoint and an `Execution`, and whose
+            `fast_precisions` tells what a device is fast in.
+        precisions: What it can multiply in.
         summary: What it is, for help.
     """
 

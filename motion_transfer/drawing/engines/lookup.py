@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Float32, Int32, UInt8
 
 from motion_transfer.drawing.engines.interface import FeatureMap
-from nhrr_core.uv_tables import CHART_SIZE, load_uv_tables
+from motion_transfer.drawing.unfolding import chart_entries
+from nhrr_core.uv_tables import load_uv_tables
 
 
 class FeatureRows:
@@ -31,9 +32,8 @@ class FeatureRows:
         """Look each pixel up, bilinearly; 0 outside the body, see `nhrr_core.sample_features`."""
         first, shares = _corners(self._size)
         body = np.flatnonzero(iuv[..., 0])
-        part, u, v = iuv.reshape(-1, 3)[body].T.astype(np.int32)
-        code = ((part - 1) * CHART_SIZE + v) * CHART_SIZE + u
-        corner, right, down = first[code], *(share[code, None] for share in shares)
+        entry = chart_entries(iuv.reshape(-1, 3)[body])
+        corner, right, down = first[entry], *(share[entry, None] for share in shares)
         above = self._between(corner, right)
         below = self._between(corner + self._size, right)
         looked_up = np.zeros((iuv.shape[0] * iuv.shape[1], self._rows.shape[1]), np.float32)

@@ -49,14 +49,8 @@ class Convolutions:
 
     def folded(self, x: str, name: str, norm: str) -> str:
         """A 3x3 convolution, the batch norm after it, and ReLU."""
-        scale, shift, mean, variance = (
-            self._weights[f"{norm}.{part}"]
-            for part in ("weight", "bias", "running_mean", "running_var")
-        )
-        gain = scale / np.sqrt(variance + np.float32(NORM_EPSILON))
-        weight = self._weights[f"{name}.weight"] * gain[:, None, None, None]
-        pads = [1, 1, 1, 1]
-        y = self._append("Conv", x, name, weight, shift - mean * gain, {"pads": pads})
+        weight, bias = fold_norm(self._weights, name, norm)
+        y = self._append("Conv", x, name, weight, bias, {"pads": [1, 1, 1, 1]})
         return self._graph("Relu", y)
 
     def doubling(self, x: str, name: str, *, even: bool) -> str:
@@ -118,6 +112,15 @@ class Convolutions:
         codes = np.round(weight / scale).astype(np.int8)
         zeros = np.zeros(scale.size, np.int8)
         return self._graph("DequantizeLinear", codes, scale.ravel(), zeros, axis=outputs)
+
+
+def fold_norm(weights: Weights, name: str, norm: str) -> tuple[Kernel, Float32[np.ndarray, " O"]]:
+    """Make kernel and bias of a convolution without a bias and the batch norm after it."""
+    scale, shift, mean, variance = (
+        weights[f"{norm}.{part}"] for part in ("weight", "bias", "running_mean", "running_var")
+    )
+    gain = scale / np.sqrt(variance + np.float32(NORM_EPSILON))
+    return weights[f"{name}.weight"] * gain[:, None, None, None], shift - mean * gain
 
 
 def append_feature_net(graph: Graph, x: str, weights: Weights) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float32, Int64
+from jaxtyping import Float32
 
 from motion_transfer.drawing.graphs.graph import FLOAT, INT32, INT64, Graph
 from motion_transfer.drawing.graphs.networks import enlarge
+from motion_transfer.drawing.textures import pick_nearest, twins
 from nhrr_core.config import CLEARANCE_SIZE, FILL_FROM, FILL_METRES, FILL_TO, PLACE_METRES
 from nhrr_core.uv_tables import CHART_SIZE, UVTables, load_uv_tables
 
@@ -30,7 +31,7 @@ def fill_holes(graph: Graph, texture: str, shown: str, size: int, channels: int)
     tables = load_uv_tables()
     colours = graph("Reshape", texture, np.array([1, channels, -1]))
     known = graph("Reshape", shown, np.array([1, 1, -1]))
-    side, depth = (resize_twins(twin, size) for twin in (tables.side_twin, tables.depth_twin))
+    side, depth = twins(size)
     for twin in (side, depth, side):
         hidden = graph("Equal", known, 0)
         colours = graph("Where", hidden, graph("Gather", colours, twin, axis=2), colours)
@@ -49,13 +50,6 @@ def fill_holes(graph: Graph, texture: str, shown: str, size: int, channels: int)
     mean = graph("Reshape", mean, np.array([1, channels, FILL_TO, FILL_TO]))
     filled = resize_nearest(graph, mean, FILL_TO, size)
     return graph("Where", graph("Greater", shown, 0), texture, filled), shown
-
-
-def resize_twins(twin: Int64[np.ndarray, "S S"], size: int) -> Int64[np.ndarray, " L"]:
-    own = len(twin)
-    centres = (np.arange(size) * 2 + 1) * own // (2 * size)
-    rows, columns = np.divmod(twin[centres][:, centres], own)
-    return (rows * size // own * size + columns * size // own).ravel()
 
 
 def resize_nearest(graph: Graph, x: str, size: int, wanted: int) -> str:
@@ -104,10 +98,9 @@ def _lie_at_their_place(tables: UVTables, size: int) -> Float32[np.ndarray, "T T
 
 def texel_positions(size: int) -> Float32[np.ndarray, "1 3 T T"]:
     """The position of each texel on the body, each axis in [-1, 1]."""
-    position = load_uv_tables().position
-    chosen = (np.arange(size) * 2 + 1) * len(position) // (2 * size)
-    places = position[chosen][:, chosen] / np.abs(position).max((0, 1))
-    return np.ascontiguousarray(places.transpose(2, 0, 1)[None])
+    position = load_uv_tables().position.transpose(2, 0, 1)
+    places = pick_nearest(position, size) / np.abs(position).max((1, 2), keepdims=True)
+    return np.ascontiguousarray(places[None])
 
 
 def look_up(graph: Graph, feature_map: str, iuv: str) -> tuple[str, str]:

@@ -12,6 +12,7 @@ import onnx
 from jaxtyping import Float32
 
 from motion_transfer.drawing.graphs.graph import FLOAT, Graph
+from motion_transfer.drawing.graphs.networks import fold_norm
 from motion_transfer.estimate.interface import LANDMARK, LANDMARK_COUNT
 from motion_transfer.estimate.iuv.body import (
     GRID,
@@ -29,7 +30,6 @@ from motion_transfer.estimate.iuv.body import (
 from motion_transfer.estimate.iuv.weights import FINER, PARTS, Weights, read_weights
 from nhrr_core.parts import PART_COUNT
 
-NORM_EPSILON = 1e-5  # of torch's norms
 MIDDLE = np.array([0.5, 0.5, 0], np.float32)  # of the window; depth has its own
 
 
@@ -173,11 +173,7 @@ class _Layers:
 
     def _normed(self, features: str, name: str) -> str:
         """Append a convolution that the normalisation after it is part of."""
-        scale, shift = self._named(f"{name}_norm")
-        mean, variance = (self._weights[f"{name}_norm.running_{what}"] for what in ("mean", "var"))
-        gain = scale / np.sqrt(variance + np.float32(NORM_EPSILON))
-        weight = self._weights[f"{name}.weight"] * gain[:, None, None, None]
-        return self._convolve(features, weight, shift - mean * gain)
+        return self._convolve(features, *fold_norm(self._weights, name, f"{name}_norm"))
 
     def _convolve(self, features: str, weight: np.ndarray, bias: np.ndarray) -> str:
         return self._graph("Conv", features, weight, bias, pads=[weight.shape[-1] // 2] * 4)

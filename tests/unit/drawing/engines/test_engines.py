@@ -24,8 +24,9 @@ from motion_transfer.drawing.engines import (
 from motion_transfer.drawing.engines.graph_engine import GraphEngine
 from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
-from motion_transfer.drawing.engines.outline import pixels_per_texel, signed_distance
+from motion_transfer.drawing.engines.outline import signed_distance
 from motion_transfer.drawing.engines.torch_engine import BATCHES, choose_batch
+from motion_transfer.drawing.unfolding import pixels_per_texel
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.evaluation.calibration import measure_ranges
 from motion_transfer.render.options import SourceOptions
