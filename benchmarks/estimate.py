@@ -1,11 +1,16 @@
 """How near the IUV of raw photos comes to DensePose's, and how fast `mt iuv` is.
 
     MT_SAMPLES=folder .venv/bin/python benchmarks/estimate.py photos [--pictures OUT]
+    .venv/bin/python benchmarks/estimate.py clips [--people 8]
     .venv/bin/python benchmarks/estimate.py speed [--against CHECKOUT] [--size 854x480]
 
 `photos`: the folder holds real photos with DensePose's own IUV, `deepfashion/*.png` with
 `*_iuv.png` beside them, and `densepose_demo/demo_im.jpg` with `demo_im_IUV.png`, of which one
 person is taken.
+
+`clips`: held-out people who stand still, seen by a camera with noise and a flickering exposure: how
+many of the body's pixels change their part from one frame to the next. And people who turn once
+around themselves: in how many frames left and right, or front and back, are exchanged.
 
 `speed`: a clip of the demo's person, who goes to and fro, in H.264. Whole runs, decode to encode,
 in turns with those of another checkout of this project; then what each step takes alone.
@@ -23,7 +28,8 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from itertools import islice
+from dataclasses import replace
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +44,7 @@ from motion_transfer.estimate.interface import AT_ONCE, PersonEstimate
 from motion_transfer.estimate.shots import mark_shots
 from motion_transfer.media.iuv.writing import IuvOutput, write_iuv
 from motion_transfer.media.pictures.formats import open_pictures
+from motion_transfer.people import PeopleStream
 from motion_transfer.training.iuv.trainer import IuvScore, score_iuv
 
 ROOT = Path(__file__).parents[1]
@@ -47,6 +54,8 @@ MAN = (slice(170, 460), slice(170, 290))
 
 GOALS = IuvScore(iou=0.87, part_agreement=0.86, uv_error=0.06, swapped=0.0, turned=0.0)
 STEP_FRAMES = 60
+CLIP_SIZE = (384, 384)
+EXCHANGED = 0.4  # of a body or a trunk: more than borders
 
 RUN = r"""
 import re, sys, time
@@ -69,6 +78,11 @@ def main() -> None:
     photos.add_argument("--weights", type=Path)
     photos.add_argument("--pictures", type=Path, help="write photo, DensePose's and our IUV here")
     photos.set_defaults(do=compare_photos)
+    clips = ways.add_parser("clips")
+    clips.add_argument("--people", type=int, default=8)
+    clips.add_argument("--frames", type=int, default=60)
+    clips.add_argument("--weights", type=Path)
+    clips.set_defaults(do=score_clips)
     speed = ways.add_parser("speed")
     speed.add_argument("--against", type=Path, metavar="CHECKOUT")
     speed.add_argument("--clip", type=Path, help="instead of the demo's person")
@@ -121,6 +135,45 @@ def _rgb(path: Path) -> np.ndarray:
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     assert picture is not None, path
     return np.ascontiguousarray(picture[..., ::-1])
+
+
+def score_clips(options: argparse.Namespace) -> None:
+    """Print how steady the IUV of still people is, and how right that of turning ones."""
+    people = PeopleStream(split="held-out", size=CLIP_SIZE, framing="full")
+    unsteady, turning = [], []
+    for number in range(options.people):
+        dressed, shot = people.dress(number), people.shot(number, 0)
+        estimator = BlazePoseEstimator(weights=options.weights, most_people=1)
+        photo = people.take(dressed, replace(shot, grain=0)).rgb
+        rng = np.random.default_rng(number)
+        noisy = (with_noise(photo, rng) for _ in range(options.frames))
+        still = [estimator.estimate(frame) for frame in noisy]
+        parts = [lay_iuv(found, *photo.shape[:2])[..., 0] for found in still]
+        unsteady.append([changed_share(a, b) for a, b in pairwise(parts)])
+        estimator.start_shot()
+        for turn in np.linspace(0, 2 * np.pi, options.frames, endpoint=False):
+            pose = replace(shot.pose, turn=shot.pose.turn + turn)
+            taken = people.take(dressed, replace(shot, pose=pose, seed=rng.integers(1 << 30)))
+            iuv = lay_iuv(estimator.estimate(taken.rgb), *photo.shape[:2])
+            turning.append(score_iuv(iuv, taken.iuv))
+    print(f"still: {np.mean(unsteady):.2%} of the body changes its part from frame to frame")
+    for name in IuvScore.__dataclass_fields__:
+        print(f"turning: {name} {np.nanmean([getattr(one, name) for one in turning]):.3f}")
+    for name in ("swapped", "turned"):
+        frames = sum(getattr(one, name) > EXCHANGED for one in turning)
+        print(f"turning: {name} in {frames} of {len(turning)} frames")
+
+
+def with_noise(photo: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """What a camera makes of a scene that does not move."""
+    exposed = photo * rng.normal(1, 0.01)
+    return (exposed + rng.normal(0, 3, photo.shape)).round().clip(0, 255).astype(np.uint8)
+
+
+def changed_share(before: np.ndarray, after: np.ndarray) -> float:
+    """The share of the pixels of a body in either frame that have another part in the other."""
+    body = (before > 0) | (after > 0)
+    return float((before != after)[body].mean()) if body.any() else 0.0
 
 
 def time_runs(options: argparse.Namespace) -> None:

@@ -67,12 +67,14 @@ def observe(people: int, views: int = 2) -> list[Observation]:
             shot = stream.shot(number, view)
             photo, posed = stream.take(dressed, shot), dressed.posed(shot.pose)
             exact = exact_landmarks(posed, model, photo.camera)
-            seen, _ = find_body(photo.rgb, tracker, exact)
-            if seen is not None:
+            body = find_body(photo.rgb, tracker, exact)
+            if body is not None:
                 transforms = posed.transforms[carrying_bones(posed.body)]
                 rest = rest_places(posed.body, model)
                 found.append(
-                    Observation(exact, seen, transforms, rest, posed.body.height, photo.camera)
+                    Observation(
+                        exact, body.landmarks, transforms, rest, posed.body.height, photo.camera
+                    )
                 )
     return found
 

@@ -267,6 +267,12 @@ def iuv() -> None:
     default="train",
     help="train (default) or held-out: never the same people.",
 )
+@click.option(
+    "--assets",
+    type=FILE,
+    metavar="DIR",
+    help="Folder of MakeHuman's assets, which half of them wear; else MT_ASSETS, if it is set.",
+)
 @click.option("--workers", type=click.IntRange(1), help="Processes; default: one for each core.")
 @quiet_option
 def make(data: Path, quiet: bool, **options: Any) -> None:
@@ -287,6 +293,7 @@ def make(data: Path, quiet: bool, **options: Any) -> None:
 @click.option("--steps", type=click.IntRange(1), help="In all; default 20000.")
 @click.option("--batch-size", type=click.IntRange(1), help="People at once; default 16.")
 @click.option("--rate", "learning_rate", type=float, help="Highest learning rate; default 0.002.")
+@click.option("--init", type=FILE, help="Weights to begin with, of the same sizes.")
 @quiet_option
 def fit(data: Path, run: Path, quiet: bool, **options: Any) -> None:
     """Train on samples; a run that was stopped goes on where it was."""
@@ -313,7 +320,7 @@ def score(data: Path, weights: Path) -> None:
     from motion_transfer.training.iuv.samples import list_samples
     from motion_transfer.training.iuv.trainer import IuvScore, score_samples
 
-    files, network = list_samples(data), load_weights(weights)
+    files, network = list_samples(data), load_weights(weights).fused()
     scores = []
     with CountBar("scoring", unit="photo", total=len(files), quiet=False) as bar:
         for each in score_samples(files, network):

@@ -10,19 +10,25 @@ from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Float32, Float64, UInt8
 
 from motion_transfer.drawing.person import Box
-from motion_transfer.estimate.blazepose.networks import SeenBody
+from motion_transfer.estimate.blazepose.networks import LandmarkModel, PersonDetector, SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
-from motion_transfer.estimate.inference import CpuNetwork, open_network
+from motion_transfer.estimate.inference import CpuNetwork
 from motion_transfer.estimate.interface import AT_ONCE, Finish, PersonEstimate, check_frame
 from motion_transfer.estimate.iuv.body import MASK_SIZE, body_arrays, body_window
 from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
-from motion_transfer.estimate.models import MODEL_FILES, digest, find_model
+from motion_transfer.estimate.models import (
+    DETECTOR,
+    LANDMARKER,
+    MODEL_FILES,
+    digest,
+    find_model,
+)
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -55,8 +61,9 @@ class BlazePoseEstimator:
         with ThreadPoolExecutor() as threads:  # each takes a quarter of a second
             painter = partial(_open_painter, weights) if weights else _open_shipped
             network = threads.submit(painter)
-            for _ in threads.map(open_network, map(find_model, MODEL_FILES)):
-                pass  # the tracker finds them open
+            detector = threads.submit(PersonDetector, find_model(DETECTOR))
+            threads.submit(LandmarkModel, find_model(LANDMARKER)).result()
+            detector.result()  # the tracker finds them open
         self._network = network.result()
         self._tracker = BodyTracker(most_people=most_people, smooth=smooth, frame_rate=frame_rate)
         self._fit = fit
@@ -96,7 +103,8 @@ class BlazePoseEstimator:
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
         # the network shrinks the mask to its own size: no need to see it much finer
         mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
-        (painted,) = self._network.run(*body_arrays(body.landmarks, mask, window))
+        features = body.features.look(_into(window)) if body.features else None
+        (painted,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
         return PersonEstimate(
             track=number,
             box=box,
@@ -139,6 +147,12 @@ def _box_on_frame(body: SeenBody, height: int, width: int, level: float) -> Box 
     if (high <= low).any():
         return None
     return Box(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+
+
+def _into(window: Box) -> Float64[np.ndarray, "2 3"]:
+    """From frame coordinates to the window's own."""
+    scale = 1 / window.width
+    return np.array([[scale, 0, -window.left * scale], [0, scale, -window.top * scale]])
 
 
 def _mask_in(body: SeenBody, window: Box, size: int) -> Float32[np.ndarray, "size size"]:

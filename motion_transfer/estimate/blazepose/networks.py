@@ -16,7 +16,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Float32, Float64, UInt8
 
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.inference import open_network
@@ -30,6 +30,12 @@ LEAST_SCORE = 0.5
 SAME_PERSON = 0.3  # overlap (intersection over union) from which two boxes are one person
 
 LANDMARKS_SIZE = 256
+FEATURE_TENSORS = tuple(
+    f"model_1/model/up_sampling2d_{stage}/resize/ResizeBilinear" for stage in (2, 3)
+)
+"""Enlarged maps of the landmark model: with the finer maps that are added to them they are all that
+its heat maps, and its mask, are read from."""
+
 LEAST_PRESENCE = 0.5  # a smaller chance that a body is there means that there is none
 REFINED_RADIUS = 3  # cells: a landmark is refined by its heat map's 7 x 7 cells around it,
 REFINED_FROM = 0.5  # where one of them is at least this hot
@@ -134,6 +140,44 @@ def _overlaps(
 
 
 @dataclass(frozen=True)
+class BodyFeatures:
+    """What the landmark model knows of each place of a region, before it decides.
+
+    Attributes:
+        coarse: What the heat maps are read from.
+        fine: What the mask is read from.
+        region: Where it looked.
+    """
+
+    coarse: Float32[np.ndarray, "64 64 48"]
+    fine: Float32[np.ndarray, "128 128 8"]
+    region: Region
+
+    def look(
+        self, window: Float64[np.ndarray, "2 3"]
+    ) -> tuple[Float32[np.ndarray, "64 64 48"], Float32[np.ndarray, "128 128 8"]]:
+        """See both in a window, 0 where it reaches beyond the region.
+
+        Args:
+            window: From frame coordinates to the window's, which run from (0, 0) to (1, 1).
+        """
+        return self._look(self.coarse, window), self._look(self.fine, window)
+
+    def _look(
+        self, features: Float32[np.ndarray, "n n C"], window: Float64[np.ndarray, "2 3"]
+    ) -> Float32[np.ndarray, "n n C"]:
+        size = len(features)
+        pixels = LANDMARKS_SIZE / size  # of the picture that the network saw
+        seen = np.array([[pixels, 0, pixels / 2 - 0.5], [0, pixels, pixels / 2 - 0.5], [0, 0, 1]])
+        to_frame = self.region.matrix(LANDMARKS_SIZE) @ seen
+        # OpenCV's whole numbers are pixel centres
+        to_frame[:, 2] += 0.5
+        matrix = window @ np.vstack([to_frame, [0, 0, 1]]) * size
+        matrix[:, 2] -= 0.5
+        return cv2.warpAffine(features, matrix, (size, size), flags=cv2.INTER_LINEAR)
+
+
+@dataclass(frozen=True)
 class SeenBody:
     """What the landmark model saw in a region.
 
@@ -143,6 +187,7 @@ class SeenBody:
         region: Where it looked.
         mask: The person's share of each pixel of the region, 0..1.
         next_region: Where to look in the next frame.
+        features: None where the body was given other proportions than the picture's.
     """
 
     presence: float
@@ -150,13 +195,14 @@ class SeenBody:
     region: Region
     mask: Float32[np.ndarray, "256 256"]
     next_region: Region
+    features: BodyFeatures | None
 
 
 class LandmarkModel:
     """The landmark model."""
 
     def __init__(self, model: Path) -> None:
-        self._network = open_network(model)
+        self._network = open_network(model, FEATURE_TENSORS)
 
     def locate(self, frame: UInt8[np.ndarray, "H W 3"], region: Region) -> SeenBody | None:
         """Find the body in a region of the frame; None where there is none.
@@ -168,7 +214,7 @@ class LandmarkModel:
             return None
         seen = region.cut(frame, LANDMARKS_SIZE, border=cv2.BORDER_REPLICATE)
         outputs = self._network.run(seen[None].astype(np.float32) / 255)
-        points, presence, mask, heat, world = (output[0] for output in outputs)
+        points, presence, mask, heat, world, *maps = (output[0] for output in outputs)
         if (chance := float(presence[0])) < LEAST_PRESENCE:
             return None
         rows = points.reshape(-1, 5)  # x, y, depth, and two chances
@@ -185,7 +231,10 @@ class LandmarkModel:
             presence=chances[kept, 1],
         )
         next_region = Region.around_body(*on_frame[LANDMARK_COUNT : LANDMARK_COUNT + 2])
-        return SeenBody(chance, landmarks, region, _sigmoid(mask[..., 0]), next_region)
+        # copies: the network's next answer overwrites this one
+        coarse, fine = (each.transpose(1, 2, 0).copy() for each in maps)
+        features = BodyFeatures(coarse, fine, region)
+        return SeenBody(chance, landmarks, region, _sigmoid(mask[..., 0]), next_region, features)
 
 
 def refine(

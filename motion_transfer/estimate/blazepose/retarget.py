@@ -187,7 +187,7 @@ def fit_body(body: SeenBody, fit: BodyFit) -> SeenBody:
     growth = max(1.0, float(reach[1] / max(reach[0], 1e-6)))
     region = replace(body.region, side=body.region.side * growth)
     mask = _warp(body.mask, body.region, region, before, after, fit)
-    return replace(body, landmarks=fitted, region=region, mask=mask)
+    return replace(body, landmarks=fitted, region=region, mask=mask, features=None)
 
 
 def _check_landmarks(landmarks: Landmarks) -> None:

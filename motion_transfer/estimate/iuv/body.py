@@ -1,4 +1,4 @@
-"""What the IUV network is told of a person: a window, and landmarks and mask in it. No torch here.
+"""What the IUV network is told of a person, in a window around it. No torch here.
 
 Convention: the network looks at a square window around a person. Window coordinates run from (0, 0)
 at its top left corner to (1, 1); depth is in the same unit.
@@ -21,6 +21,9 @@ GRID = 64  # bones are drawn on 64 x 64 cells; the mask's finer pixels are chann
 MARGIN = 0.06  # share of the window's side that is left free around the person
 REACH = 0.2  # how far a bone is felt, in lengths of the trunk: a thigh's width
 LEAST_REACH = 1.5 / GRID  # a cell and a half: thinner bones would fall between the cells
+COARSE = (64, 64, 48)
+FINE = (128, 128, 8)
+FEATURE_SCALE = 0.25  # brings the landmark model's features to about one
 NEAR_METRES = 0.3  # the unit in which depths are seen
 MOST_BESIDE, MOST_DEPTH = 3.0, 4.0  # far from a bone, how far it is says nothing more
 
@@ -39,7 +42,8 @@ BONES: tuple[Bone, ...] = (
 )
 """What is drawn. The trained weights depend on the order."""
 
-MAP_CHANNELS = 3 * len(BONES) + (MASK_SIZE // GRID) ** 2 + 2
+FINE_CELL, MASK_CELL = FINE[0] // GRID, MASK_SIZE // GRID  # pixels along a cell's side
+MAP_CHANNELS = 3 * len(BONES) + 2 + MASK_CELL**2 + COARSE[2] + FINE_CELL**2 * FINE[2]
 VECTOR_LENGTH = 7 * LANDMARK_COUNT
 
 
@@ -51,12 +55,16 @@ class BodyArrays(NamedTuple):
         world: Metres, as in `Landmarks`.
         visibility: As in `Landmarks`, 0..1.
         mask: How much of each pixel is the person, 0..1.
+        coarse, fine: The landmark model's features there, see `BodyFeatures`; 0 where there are
+            none.
     """
 
     points: Float32[np.ndarray, "1 33 3"]
     world: Float32[np.ndarray, "1 33 3"]
     visibility: Float32[np.ndarray, "1 33"]
     mask: Float32[np.ndarray, "1 1 256 256"]
+    coarse: Float32[np.ndarray, "1 64 64 48"]
+    fine: Float32[np.ndarray, "1 128 128 8"]
 
 
 def body_window(landmarks: Landmarks, mask_box: Box | None) -> Box:
@@ -76,22 +84,31 @@ def body_window(landmarks: Landmarks, mask_box: Box | None) -> Box:
     return Box(left, top, left + side, top + side)
 
 
-def body_arrays(landmarks: Landmarks, mask: Float32[np.ndarray, "H W"], window: Box) -> BodyArrays:
+def body_arrays(
+    landmarks: Landmarks,
+    mask: Float32[np.ndarray, "H W"],
+    features: tuple[Float32[np.ndarray, "64 64 48"], Float32[np.ndarray, "128 128 8"]] | None,
+    window: Box,
+) -> BodyArrays:
     """Put together what is known of one person.
 
     Args:
         mask: 0..1 on the window, at any size.
+        features: Coarse and fine ones on the window.
     """
     points = landmarks.image.copy()
     points[:, :2] -= (window.left, window.top)
     points /= window.width
     way = cv2.INTER_AREA if mask.shape[0] > MASK_SIZE else cv2.INTER_LINEAR
+    coarse, fine = features or (np.zeros(COARSE, np.float32), np.zeros(FINE, np.float32))
     seen = cv2.resize(mask, (MASK_SIZE, MASK_SIZE), interpolation=way)
     return BodyArrays(
         points=points[None],
         world=np.ascontiguousarray(landmarks.world)[None],
         visibility=np.ascontiguousarray(landmarks.visibility)[None],
         mask=seen[None, None],
+        coarse=coarse[None],
+        fine=fine[None],
     )
 
 

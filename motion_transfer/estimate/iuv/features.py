@@ -1,4 +1,4 @@
-"""Landmarks and mask as the IUV network sees them: pictures of bones, and a row of numbers.
+"""What is known of a person as the IUV network sees it: maps, and a row of numbers.
 
 Convention: that of `body`. Of a tensor B x C x H x W the pixel centres lie at (i + 0.5) / W.
 """
@@ -16,10 +16,10 @@ from torch import Tensor
 from motion_transfer.drawing.person import Box
 from motion_transfer.estimate.interface import LANDMARK, Landmarks
 from motion_transfer.estimate.iuv.body import (
+    FEATURE_SCALE,
     GRID,
     HIPS,
     LEAST_REACH,
-    MASK_SIZE,
     MOST_BESIDE,
     MOST_DEPTH,
     NEAR_METRES,
@@ -38,11 +38,18 @@ class BodyInput(NamedTuple):
     world: Float[Tensor, "B 33 3"]
     visibility: Float[Tensor, "B 33"]
     mask: Float[Tensor, "B 1 256 256"]
+    coarse: Float[Tensor, "B 64 64 48"]
+    fine: Float[Tensor, "B 128 128 8"]
 
 
-def body_input(landmarks: Landmarks, mask: Float32[np.ndarray, "H W"], window: Box) -> BodyInput:
+def body_input(
+    landmarks: Landmarks,
+    mask: Float32[np.ndarray, "H W"],
+    features: tuple[Float32[np.ndarray, "64 64 48"], Float32[np.ndarray, "128 128 8"]] | None,
+    window: Box,
+) -> BodyInput:
     """Put together what is known of one person (B = 1), see `body_arrays`."""
-    return BodyInput(*map(torch.from_numpy, body_arrays(landmarks, mask, window)))
+    return BodyInput(*map(torch.from_numpy, body_arrays(landmarks, mask, features, window)))
 
 
 def stack_inputs(inputs: list[BodyInput]) -> BodyInput:
@@ -50,18 +57,21 @@ def stack_inputs(inputs: list[BodyInput]) -> BodyInput:
     return BodyInput(*(torch.cat(tensors) for tensors in zip(*inputs, strict=True)))
 
 
+# positions do not bear the few bits of a lower precision
+@torch.autocast("cpu", enabled=False)
 def feature_vector(body: BodyInput) -> Float[Tensor, "B 231"]:
-    """List everything but the mask, as numbers around zero."""
+    """List what the landmarks say, as numbers around zero."""
     points = body.points - torch.tensor([0.5, 0.5, 0.0])
     world = body.world / NEAR_METRES
     return torch.cat([points.flatten(1) * 2, world.flatten(1), body.visibility * 2 - 1], 1)
 
 
+@torch.autocast("cpu", enabled=False)
 def feature_maps(body: BodyInput) -> Float[Tensor, "B C 64 64"]:
-    """Draw bones and mask.
+    """Draw bones, mask and features.
 
     For each bone: how near it is, on which side of it one is, and its depth there, the latter two
-    weighted by nearness; then x and y, and the mask's pixels.
+    weighted by nearness; then x and y, the mask's pixels, the coarse features and the fine ones'.
     """
     ends = _ends(body.points)  # B bones 2 3
     depth = _ends(body.world)[..., 2] / NEAR_METRES
@@ -81,9 +91,16 @@ def feature_maps(body: BodyInput) -> Float[Tensor, "B C 64 64"]:
     batch = bones.shape[0]
     places = (grid.T * 2 - 1).expand(batch, 2, -1)
     drawn = torch.cat([bones, places], 1).reshape(batch, -1, GRID, GRID)
-    finer = MASK_SIZE // GRID
-    cells = body.mask.view(batch, GRID, finer, GRID, finer).permute(0, 2, 4, 1, 3)
-    return torch.cat([drawn, cells.reshape(batch, finer**2, GRID, GRID)], 1)
+    mask, fine = _cells(body.mask.permute(0, 2, 3, 1)), _cells(body.fine * FEATURE_SCALE)
+    return torch.cat([drawn, mask, _cells(body.coarse * FEATURE_SCALE), fine], 1)
+
+
+def _cells(maps: Float[Tensor, "B H W C"]) -> Float[Tensor, "B c 64 64"]:
+    """Make channels of the pixels of each cell: row by row, all of a pixel's side by side."""
+    batch, height, _, channels = maps.shape
+    finer = height // GRID
+    cells = maps.reshape(batch, GRID, finer, GRID, finer * channels).permute(0, 2, 4, 1, 3)
+    return cells.reshape(batch, finer**2 * channels, GRID, GRID)
 
 
 def _ends(points: Float[Tensor, "B 33 3"]) -> Float[Tensor, "B bones 2 3"]:

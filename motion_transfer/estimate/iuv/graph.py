@@ -15,9 +15,14 @@ from motion_transfer.drawing.graphs.graph import FLOAT, Graph
 from motion_transfer.drawing.graphs.networks import fold_norm
 from motion_transfer.estimate.interface import LANDMARK, LANDMARK_COUNT
 from motion_transfer.estimate.iuv.body import (
+    COARSE,
+    FEATURE_SCALE,
+    FINE,
+    FINE_CELL,
     GRID,
     HIPS,
     LEAST_REACH,
+    MASK_CELL,
     MASK_SIZE,
     MOST_BESIDE,
     MOST_DEPTH,
@@ -46,8 +51,17 @@ def build_graph(weights: Path) -> onnx.ModelProto:
     world = graph.input("world", FLOAT, (1, LANDMARK_COUNT, 3))
     visibility = graph.input("visibility", FLOAT, (1, LANDMARK_COUNT))
     mask = graph.input("mask", FLOAT, (1, 1, MASK_SIZE, MASK_SIZE))
+    coarse, fine = (
+        graph.input("coarse", FLOAT, (1, *COARSE)),
+        graph.input("fine", FLOAT, (1, *FINE)),
+    )
     row = _append_row(graph, points, world, visibility)
-    maps = _append_maps(graph, points, world, mask)
+    maps = graph.join(
+        _append_bones(graph, points, world),
+        graph("SpaceToDepth", mask, blocksize=MASK_CELL),
+        _append_features(graph, coarse),
+        graph("SpaceToDepth", _append_features(graph, fine), blocksize=FINE_CELL),
+    )
     cells = _Layers(graph, tensors).append(row, maps, len(config.widths))
     spread = graph("DepthToSpace", cells, blocksize=FINER, mode="DCR")
     # not split in the graph: that would take OpenVINO a third of the network's time
@@ -72,8 +86,12 @@ def _append_row(graph: Graph, points: str, world: str, visibility: str) -> str:
     return graph.join(graph("Reshape", places, flat), graph("Reshape", metres, flat), shown)
 
 
-def _append_maps(graph: Graph, points: str, world: str, mask: str) -> str:
-    """Append what `feature_maps` computes. What is of bones is 1 x bones x cells, or x 1."""
+def _append_features(graph: Graph, features: str) -> str:
+    return graph("Mul", graph("Transpose", features, perm=[0, 3, 1, 2]), FEATURE_SCALE)
+
+
+def _append_bones(graph: Graph, points: str, world: str) -> str:
+    """Append what `feature_maps` draws: 1 x bones x cells or x 1, at last 1 x C x 64 x 64."""
     grid_x, grid_y = cell_centres().T[:, None, None]
     start_x, start_y, _ = _append_middles(graph, points, bone_ends()[:, 0])
     end_x, end_y, _ = _append_middles(graph, points, bone_ends()[:, 1])
@@ -98,8 +116,7 @@ def _append_maps(graph: Graph, points: str, world: str, mask: str) -> str:
     places = np.concatenate([grid_x, grid_y], 1) * 2 - 1
     bones = (near, graph("Mul", near, beside), graph("Mul", near, depth))
     drawn = graph.join(*bones, graph.constant(places))
-    cells = graph("SpaceToDepth", mask, blocksize=MASK_SIZE // GRID)
-    return graph.join(graph("Reshape", drawn, np.array([1, -1, GRID, GRID])), cells)
+    return graph("Reshape", drawn, np.array([1, -1, GRID, GRID]))
 
 
 def _append_middles(

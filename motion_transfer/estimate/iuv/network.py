@@ -88,7 +88,7 @@ class IuvNetwork(nn.Module):
 
     def fused(self) -> IuvNetwork:
         """Make itself fit for use only: normalisation becomes part of the convolutions."""
-        self.eval()
+        self.eval().requires_grad_(False)
         for block in self.modules():
             if isinstance(block, Block):
                 block.fuse()
@@ -148,12 +148,11 @@ def save_weights(path: Path, network: IuvNetwork, notes: Mapping[str, str]) -> N
 
 
 def load_weights(path: Path) -> IuvNetwork:
-    """Load a network, ready to be used.
+    """Load a network, as it was trained: `fused` makes it ready to be used.
 
     Raises: WeightsError if the file is missing, damaged, or another network's.
     """
     header = read_header(path, WHAT)
     config = read_config(header.metadata, path)
     # into float32, from the half precision of the file
-    network = load_network(lambda: IuvNetwork(config), header.state, path, WHAT)
-    return network.fused().requires_grad_(False)
+    return load_network(lambda: IuvNetwork(config), header.state, path, WHAT)

@@ -6,7 +6,7 @@ enough to cover how BlazePose errs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
@@ -35,12 +35,9 @@ LIMBS: tuple[tuple[int, ...], ...] = tuple(
 
 BODY_METRES = 1.7  # an average body, to turn shares of a body's height into metres
 LIMB_AWAY, JOINT_AWAY = 0.06, 0.02  # heights: errors of a lost limb, and of its landmarks besides
-LOST_VISIBILITY, CUT_VISIBILITY = 0.5, 0.6  # what is left of it, at most, of lost and cut ones
-CUT_PRESENCE = 0.1  # what is left of it beyond the picture
+LOST_VISIBILITY = 0.5  # what is left of it, at most
 DOUBT = 0.12  # by about so much BlazePose is less sure than the truth
 SOFT_PX, EDGE, SLOPE = (0.6, 3.0), (0.3, 0.7), (1.5, 4)  # a mask's border; at 0.5 it is the alpha's
-CUT_SIDES = ("bottom", "bottom", "bottom", "left", "right", "top")  # photos mostly end below
-CUT_BELOW, CUT_ELSEWHERE = (0.1, 0.6), (0.05, 0.3)  # the share of the body that is cut off
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,9 @@ class Augmentation:
         jitter, exact_jitter: The standard deviation of each landmark, at most.
         depth_jitter: That of each depth in metres; depths are also scaled by up to `depth_scale`.
         lost_limb: The share in which a limb's landmarks are elsewhere, invisible.
-        cut: The share whose picture ends somewhere in the body.
+        gain: The standard deviation of a factor on each feature channel, at most: synthetic people
+            do not excite all of them as real ones do.
+        blind: The share without features, as if BlazePose had not looked at this very body.
         turn_degrees, zoom, shift: Of the window, at most; shift is a share of its side.
     """
 
@@ -64,13 +63,14 @@ class Augmentation:
     depth_jitter: float = 0.04
     depth_scale: float = 0.25
     lost_limb: float = 0.06
-    cut: float = 0.15
+    gain: float = 0.2
+    blind: float = 0.08
     turn_degrees: float = 12.0
     zoom: float = 0.15
     shift: float = 0.05
 
 
-NOTHING = Augmentation(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+NOTHING = Augmentation(*(0,) * len(fields(Augmentation)))
 """What BlazePose says is left as it is, for evaluation."""
 
 
@@ -90,16 +90,21 @@ def training_pair(
     mask = sample.mask.astype(np.float32) / 255
     if sample.seen is None or rng.random() < settings.exact_mask:
         mask = _softened(sample.alpha.astype(np.float32) / 255, rng)
-    iuv = sample.iuv
-    if rng.random() < settings.cut:
-        iuv, mask, landmarks = _cut(iuv, mask, landmarks, rng)
     window = body_window(landmarks, mask_box(mask))
     matrix = _view(window, settings, rng)
     seen = _warped(mask, matrix, window.width, MASK_SIZE, cv2.INTER_LINEAR)
-    answer = _warped(iuv, matrix, window.width, OUTPUT_SIZE, cv2.INTER_NEAREST)
+    answer = _warped(sample.iuv, matrix, window.width, OUTPUT_SIZE, cv2.INTER_NEAREST)
     moved = _moved(landmarks, matrix)
+    features = None
+    if sample.features is not None and rng.random() >= settings.blind:
+        gain = settings.gain * rng.random()
+        coarse, fine = (
+            each * (1 + gain * rng.standard_normal(each.shape[-1], np.float32))
+            for each in sample.features.look(matrix / window.width)
+        )
+        features = coarse, fine
     own = Box(0, 0, window.width, window.width)
-    return body_input(moved, seen, own), answer
+    return body_input(moved, seen, features, own), answer
 
 
 def mask_box(mask: Float32[np.ndarray, "H W"]) -> Box | None:
@@ -143,33 +148,6 @@ def _softened(alpha: Float32[np.ndarray, "H W"], rng: Rng) -> Float32[np.ndarray
     soft = cv2.GaussianBlur(alpha, (0, 0), rng.uniform(*SOFT_PX))
     level = rng.uniform(*EDGE)
     return ((soft - level) * rng.uniform(*SLOPE) + 0.5).clip(0, 1).astype(np.float32)
-
-
-def _cut(
-    iuv: np.ndarray, mask: np.ndarray, landmarks: Landmarks, rng: Rng
-) -> tuple[np.ndarray, np.ndarray, Landmarks]:
-    """The picture ends at a line through the body; landmarks beyond are guesses."""
-    box = mask_box(mask)
-    if box is None:
-        return iuv, mask, landmarks
-    iuv, mask = iuv.copy(), mask.copy()
-    side = rng.choice(CUT_SIDES)
-    share = rng.uniform(*(CUT_BELOW if side == "bottom" else CUT_ELSEWHERE))
-    upright, far = side in ("bottom", "top"), side in ("bottom", "right")
-    low, high = (box.top, box.bottom) if upright else (box.left, box.right)
-    line = round(high - share * (high - low) if far else low + share * (high - low))
-    place = landmarks.image[:, 1 if upright else 0]
-    gone, beyond = (place > line, np.s_[line:]) if far else (place < line, np.s_[:line])
-    area = np.s_[beyond, :] if upright else np.s_[:, beyond]
-    iuv[area], mask[area] = 0, 0
-    presence, visibility = landmarks.presence.copy(), landmarks.visibility.copy()
-    presence[gone] *= CUT_PRESENCE
-    visibility[gone] *= rng.uniform(0, CUT_VISIBILITY)
-    guess = landmarks.image.copy()
-    tall = float(np.ptp(guess[:, 1]))
-    noise = rng.normal(0, JOINT_AWAY, (LANDMARK_COUNT, 3)) * tall
-    guess[gone] += noise[gone].astype(np.float32)
-    return iuv, mask, replace(landmarks, image=guess, presence=presence, visibility=visibility)
 
 
 def _view(window: Box, settings: Augmentation, rng: Rng) -> np.ndarray:

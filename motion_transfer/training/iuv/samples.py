@@ -6,17 +6,20 @@ DATA/000123_2.npz           person 123, photo 2: the arrays of a `Sample`
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
 from zipfile import BadZipFile
 
+import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
 
 from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError
+from motion_transfer.estimate.blazepose.networks import BodyFeatures, SeenBody
+from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
 from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
 from motion_transfer.estimate.models import MODEL_FILES, find_model
@@ -32,6 +35,11 @@ WORST_ANSWER = 0.08
 """A body is BlazePose's answer to the photo if its seen landmarks are closer to the true ones than
 this share of the body's height, in the median; otherwise it saw something else. Chosen by eye."""
 
+CUT = 0.2  # the share of the photos to train on that end somewhere in the body
+CUT_SIDES = ("bottom", "bottom", "bottom", "left", "right", "top")  # photos mostly end below
+CUT_BELOW, CUT_ELSEWHERE = (0.1, 0.6), (0.05, 0.3)  # the share of the body that is cut off
+FEATURES = ("coarse", "fine")
+
 
 @dataclass(frozen=True, kw_only=True)
 class SampleOptions:
@@ -41,6 +49,7 @@ class SampleOptions:
         out: The folder to write to; samples that are there stay.
         people: How many; each is photographed `views` times.
         size_px: The side of the square photos.
+        assets: Folder of MakeHuman's assets, by which half of the people are free people.
         workers: Processes; None: one for each core.
     """
 
@@ -50,15 +59,16 @@ class SampleOptions:
     seed: int = 0
     split: Split = "train"
     size_px: int = 256
+    assets: Path | None = None
     workers: int | None = None
 
     @property
     def settings(self) -> dict:
         """What decides a sample's bytes."""
         kept = asdict(self)
-        for name in ("out", "people", "views", "workers"):
+        for name in ("out", "people", "views", "workers", "assets"):
             del kept[name]
-        return {"motion-transfer": __version__, **kept}
+        return {"motion-transfer": __version__, **kept, "free": self.assets is not None}
 
 
 @dataclass(frozen=True)
@@ -71,6 +81,7 @@ class Sample:
         mask: BlazePose's, 0 where it saw nobody.
         exact: The true landmarks.
         seen: BlazePose's; None where it saw nobody or somebody else.
+        features: BlazePose's; None where `seen` is.
     """
 
     iuv: UInt8[np.ndarray, "H W 3"]
@@ -78,6 +89,7 @@ class Sample:
     mask: UInt8[np.ndarray, "H W"]
     exact: Landmarks
     seen: Landmarks | None
+    features: BodyFeatures | None
 
 
 def make_samples(options: SampleOptions, done: Callable[[int], object] = int) -> int:
@@ -113,12 +125,14 @@ def read_sample(path: Path) -> Sample:
     try:
         with np.load(path) as arrays:
             rows = arrays["landmarks"]
+            seen = len(rows) > 1
             return Sample(
                 iuv=arrays["iuv"],
                 alpha=arrays["alpha"],
                 mask=arrays["mask"],
                 exact=_unpacked(rows[0]),
-                seen=_unpacked(rows[1]) if len(rows) > 1 else None,
+                seen=_unpacked(rows[1]) if seen else None,
+                features=_read_features(arrays) if seen else None,
             )
     except (OSError, ValueError, KeyError, BadZipFile) as error:
         raise InputError(f"{path} is damaged ({error}); remove it and make it anew") from error
@@ -128,15 +142,21 @@ def write_sample(path: Path, sample: Sample) -> None:
     """Write a sample under a temporary name, then give it its own."""
     rows = [_packed(sample.exact)] + ([_packed(sample.seen)] if sample.seen else [])
     arrays = {name: getattr(sample, name) for name in ("iuv", "alpha", "mask")}
+    if sample.features is not None:
+        # in half precision: they are most of the file
+        maps = {name: getattr(sample.features, name).astype(np.float16) for name in FEATURES}
+        arrays |= {**maps, "region": np.array(astuple(sample.features.region))}
     temporary = path.with_name(f".{path.name}.part")
     with temporary.open("wb") as out:
-        np.savez_compressed(out, **arrays, landmarks=np.stack(rows))
+        np.savez(out, **arrays, landmarks=np.stack(rows))
     publish(temporary, path)
 
 
 def _open_maker(options: SampleOptions) -> MakeItem:
     side = options.size_px
-    people = PeopleStream(seed=options.seed, split=options.split, size=(side, side))
+    people = PeopleStream(
+        seed=options.seed, split=options.split, size=(side, side), assets=options.assets
+    )
     return partial(_make, options, people, BodyTracker(most_people=1, smooth=False))
 
 
@@ -151,30 +171,70 @@ def _make(options: SampleOptions, people: PeopleStream, tracker: BodyTracker, nu
         shot = people.shot(number, view)
         photo = people.take(dressed, shot)
         exact = exact_landmarks(dressed.posed(shot.pose), model, photo.camera)
-        seen, mask = find_body(photo.rgb, tracker, exact)
-        write_sample(path, Sample(photo.iuv, photo.alpha, mask, exact, seen))
+        rng = np.random.default_rng((options.seed, number, view))
+        cut = options.split == "train" and rng.random() < CUT
+        kept = choose_cut(photo.alpha, rng) if cut else Box(0, 0, *photo.alpha.shape[::-1])
+        rgb, iuv, alpha = (image[kept.slices] for image in (photo.rgb, photo.iuv, photo.alpha))
+        exact = cut_landmarks(exact, kept)
+        body = find_body(rgb, tracker, exact)
+        mask = np.zeros_like(alpha)
+        if body is not None:
+            seen = np.rint(body.mask * 255).astype(np.uint8)
+            mask = body.region.paste(seen, Box(0, 0, kept.width, kept.height))
+        found = (body.landmarks, body.features) if body else (None, None)
+        write_sample(path, Sample(iuv, alpha, mask, exact, *found))
+
+
+def choose_cut(alpha: UInt8[np.ndarray, "H W"], rng: np.random.Generator) -> Box:
+    """Choose a photo's part that ends somewhere in the body."""
+    height, width = alpha.shape
+    left, top, across, down = cv2.boundingRect((alpha > 127).view(np.uint8))
+    side = rng.choice(CUT_SIDES)
+    share = rng.uniform(*(CUT_BELOW if side == "bottom" else CUT_ELSEWHERE))
+    ends = {"left": 0, "top": 0, "right": width, "bottom": height}
+    ends[side] = {
+        "left": left + round(share * across),
+        "top": top + round(share * down),
+        "right": left + across - round(share * across),
+        "bottom": top + down - round(share * down),
+    }[side]
+    return Box(**ends) if across else Box(0, 0, width, height)
+
+
+def cut_landmarks(landmarks: Landmarks, kept: Box) -> Landmarks:
+    """Tell where landmarks lie in a part of their photo."""
+    image = landmarks.image.copy()
+    image[:, :2] -= (kept.left, kept.top)
+    inside = (image[:, :2] >= 0).all(1) & (image[:, :2] < (kept.width, kept.height)).all(1)
+    return replace(
+        landmarks,
+        image=image,
+        visibility=landmarks.visibility * inside,
+        presence=landmarks.presence * inside,
+    )
 
 
 def find_body(
     rgb: UInt8[np.ndarray, "H W 3"], tracker: BodyTracker, exact: Landmarks
-) -> tuple[Landmarks | None, UInt8[np.ndarray, "H W"]]:
-    """Let BlazePose find somebody whose true landmarks are known: its landmarks and mask.
+) -> SeenBody | None:
+    """Let BlazePose find somebody whose true landmarks are known.
 
-    Returns: None and an empty mask where it saw nobody or somebody else.
+    Returns: None where it saw nobody or somebody else.
     """
-    height, width = rgb.shape[:2]
-    nobody = None, np.zeros((height, width), np.uint8)
     tracker.start_shot()
-    found = tracker.follow(rgb)
+    found = tracker.follow(np.ascontiguousarray(rgb))
     if not found:
-        return nobody
+        return None
     body = found[0][1]
     away = np.linalg.norm((body.landmarks.image - exact.image)[:, :2], axis=1)
     tall = float(np.ptp(exact.image[:, 1]))
-    if np.median(away[exact.presence > 0.5]) > WORST_ANSWER * tall:
-        return nobody
-    mask = np.rint(body.mask * 255).astype(np.uint8)
-    return body.landmarks, body.region.paste(mask, Box(0, 0, width, height))
+    is_it = np.median(away[exact.presence > 0.5]) <= WORST_ANSWER * tall
+    return body if is_it else None
+
+
+def _read_features(arrays: Mapping[str, np.ndarray]) -> BodyFeatures:
+    coarse, fine = (arrays[name].astype(np.float32) for name in FEATURES)
+    return BodyFeatures(coarse, fine, Region(*map(float, arrays["region"])))
 
 
 def _packed(landmarks: Landmarks) -> Float32[np.ndarray, "33 8"]:

@@ -33,6 +33,7 @@ from motion_transfer.estimate.iuv.network import (
     IuvLogits,
     IuvNetwork,
     IuvNetworkConfig,
+    load_weights,
     save_weights,
 )
 from motion_transfer.estimate.iuv.painting import paint_iuv
@@ -40,7 +41,8 @@ from motion_transfer.media.publish import publish
 from motion_transfer.training.iuv.augmentation import NOTHING, Augmentation, training_pair
 from motion_transfer.training.iuv.samples import list_samples, read_sample
 from motion_transfer.training.progress import Listener, Logged
-from motion_transfer.training.speed import Clock
+from motion_transfer.training.config import Precision
+from motion_transfer.training.speed import Clock, choose_precision, keep_memory
 from motion_transfer.weights.tensors import first_line, load_pickled
 
 UV_WEIGHT = 5.0  # chosen: an l1 of U and V is small beside a cross-entropy
@@ -129,6 +131,8 @@ class TrainingSettings:
         warm_up_steps: Those in which the learning rate rises to its full height.
         keep: The share of the averaged weights that stays at each step.
         save_every: Steps between two states on disk.
+        init: Weights to begin with, of a network of the same sizes; None: random ones.
+        precision: Of the convolutions; `auto` is bf16 where the hardware multiplies it.
     """
 
     steps: int = 20000
@@ -139,6 +143,8 @@ class TrainingSettings:
     keep: float = 0.999
     save_every: int = 250
     seed: int = 0
+    init: Path | None = None
+    precision: Precision = "auto"
     network: IuvNetworkConfig = field(default_factory=IuvNetworkConfig)
     augmentation: Augmentation = field(default_factory=Augmentation)
 
@@ -153,7 +159,12 @@ class IuvTraining:
         self.settings, self.run = settings, run
         self.files = list_samples(data)
         torch.manual_seed(settings.seed)
-        self.network = IuvNetwork(settings.network)
+        if settings.init is None:
+            self.network = IuvNetwork(settings.network)
+        else:
+            self.network = load_weights(settings.init)
+        keep_memory()
+        self._dtype = choose_precision(settings.precision, torch.device("cpu"))
         self.averaged = deepcopy(self.network).requires_grad_(False)
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay
@@ -217,7 +228,9 @@ class IuvTraining:
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         self.network.train()
-        losses = iuv_loss(self.network(batch[0]), batch[1])
+        with torch.autocast("cpu", self._dtype, enabled=self._dtype != torch.float32):
+            logits = self.network(batch[0])
+        losses = iuv_loss(IuvLogits(*(each.float() for each in logits)), batch[1])
         if not torch.isfinite(losses["total"]):
             raise TrainingError(f"the loss is no number at step {self.step}; lower the rate")
         self.optimiser.zero_grad(set_to_none=True)

@@ -106,7 +106,7 @@ def seen_body(landmarks: Landmarks) -> SeenBody:
             share = ((places - a) @ (b - a) / ((b - a) @ (b - a))).clip(0, 1)
             away = np.minimum(away, np.linalg.norm(places - a - share[:, None] * (b - a), axis=1))
     mask = (10.5 - away).clip(0, 1).astype(np.float32).reshape(256, 256)
-    return SeenBody(0.9, landmarks, region, mask, region)
+    return SeenBody(0.9, landmarks, region, mask, region, None)
 
 
 def on_frame(body: SeenBody) -> np.ndarray:

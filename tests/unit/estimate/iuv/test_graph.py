@@ -13,7 +13,7 @@ import torch
 
 from motion_transfer.errors import WeightsError
 from motion_transfer.estimate.inference import CpuNetwork
-from motion_transfer.estimate.iuv.body import BodyArrays
+from motion_transfer.estimate.iuv.body import COARSE, FINE, BodyArrays
 from motion_transfer.estimate.iuv.features import BodyInput
 from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.network import IuvNetwork, load_weights, save_weights
@@ -22,7 +22,7 @@ from motion_transfer.estimate.iuv.weights import IuvNetworkConfig, shipped_file
 
 def somebody(seed: int) -> BodyArrays:
     rng = np.random.default_rng(seed)
-    shapes = ((1, 33, 3), (1, 33, 3), (1, 33), (1, 1, 256, 256))
+    shapes = ((1, 33, 3), (1, 33, 3), (1, 33), (1, 1, 256, 256), (1, *COARSE), (1, *FINE))
     body = BodyArrays(*(rng.random(shape, np.float32) for shape in shapes))
     return body._replace(world=body.world - 0.5)
 
@@ -44,7 +44,7 @@ def trained(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("shipped", [True, False])
 def test_the_graph_is_the_network(trained: Path, shipped: bool) -> None:
     weights = shipped_file() if shipped else trained
-    graph, network = CpuNetwork(build_graph(weights)), load_weights(weights)
+    graph, network = CpuNetwork(build_graph(weights)), load_weights(weights).fused()
     for seed in range(3):
         body = somebody(seed)
         if seed == 2:  # a trunk without length: bones are as thin as they get
@@ -71,7 +71,7 @@ def test_bytes_do_not_depend_on_how_many_run(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_weights_that_do_not_fit_are_refused(trained: Path) -> None:
-    network = load_weights(shipped_file())
+    network = load_weights(shipped_file()).fused()
     network.config = IuvNetworkConfig(widths=(8, 8))
     save_weights(trained, network, {})
     with pytest.raises(WeightsError, match="do not fit their own configuration"):

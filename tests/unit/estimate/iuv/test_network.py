@@ -14,6 +14,9 @@ from motion_transfer.estimate.interface import LANDMARK, Landmarks
 from motion_transfer.estimate.iuv import features
 from motion_transfer.estimate.iuv.body import (
     BONES,
+    COARSE,
+    FEATURE_SCALE,
+    FINE,
     GRID,
     MAP_CHANNELS,
     MARGIN,
@@ -52,6 +55,8 @@ def body() -> BodyInput:
         torch.rand(2, 33, 3) - 0.5,
         torch.rand(2, 33),
         torch.rand(2, 1, 256, 256),
+        torch.rand(2, *COARSE),
+        torch.rand(2, *FINE),
     )
 
 
@@ -76,9 +81,12 @@ def test_a_bone_is_drawn_where_it_is(body: BodyInput) -> None:
         assert near[0, 0] < 0.2 * near.max()
 
 
-def test_the_masks_pixels_come_in_cells(body: BodyInput) -> None:
-    cells = feature_maps(body)[:, -16:]
-    assert torch.equal(cells, torch.nn.functional.pixel_unshuffle(body.mask, 4))
+def test_mask_and_features_come_in_cells(body: BodyInput) -> None:
+    mask, coarse, fine = feature_maps(body)[:, -16 - 48 - 32 :].split((16, 48, 32), dim=1)
+    assert torch.equal(mask, torch.nn.functional.pixel_unshuffle(body.mask, 4))
+    assert torch.equal(coarse, body.coarse.permute(0, 3, 1, 2) * FEATURE_SCALE)
+    # channel c of sub-pixel (i, j) is channel (i * 2 + j) * 8 + c of the cell
+    assert fine[1, (1 * 2 + 0) * 8 + 5, 7, 9] == body.fine[1, 15, 18, 5] * FEATURE_SCALE
 
 
 def test_a_window_holds_mask_and_points_with_a_margin() -> None:
@@ -97,10 +105,13 @@ def test_input_is_in_the_windows_coordinates() -> None:
     made = body_input(
         landmarks(np.tile([[30.0, 60.0]], (33, 1))),
         np.ones((64, 64), np.float32),
+        None,
         Box(10, 20, 90, 100),
     )
     assert made.points[0, 0].tolist() == pytest.approx([0.25, 0.5, 0])
     assert made.mask.shape == (1, 1, 256, 256)
+    assert made.coarse.shape == (1, *COARSE)
+    assert not made.fine.any()
 
 
 def test_spreading_is_pixel_shuffle_in_another_order() -> None:
@@ -126,7 +137,7 @@ def test_fusing_changes_nothing(body: BodyInput) -> None:
 
 
 def test_every_input_counts(body: BodyInput) -> None:
-    inputs = [body.points, body.world, body.visibility, body.mask]
+    inputs = list(body)
     for value in inputs:
         value.requires_grad_(True)
     network = IuvNetwork(SMALL)
@@ -151,7 +162,7 @@ def test_weights_go_to_a_file_and_back(tmp_path: Path, body: BodyInput) -> None:
     network = IuvNetwork(SMALL).eval()
     save_weights(tmp_path / "w.safetensors", network, {"trained-on": "nothing"})
     with torch.inference_mode():
-        back = load_weights(tmp_path / "w.safetensors")(body)
+        back = load_weights(tmp_path / "w.safetensors").eval()(body)
         torch.testing.assert_close(back.parts, network(body).parts, atol=0.02, rtol=0.02)
 
 

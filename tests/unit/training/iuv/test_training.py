@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import torch
 
 from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError
+from motion_transfer.estimate.blazepose.networks import BodyFeatures
+from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.interface import LANDMARK_NAMES, Landmarks
 from motion_transfer.estimate.iuv.network import IuvNetworkConfig
 from motion_transfer.training.iuv.augmentation import NOTHING, Augmentation, mask_box, training_pair
-from motion_transfer.training.iuv.samples import Sample, list_samples, read_sample, write_sample
+from motion_transfer.training.iuv.samples import (
+    Sample,
+    choose_cut,
+    cut_landmarks,
+    list_samples,
+    read_sample,
+    write_sample,
+)
 from motion_transfer.training.iuv.trainer import IuvTraining, TrainingSettings, score_samples
 from motion_transfer.training.progress import Logged
 
@@ -30,7 +41,18 @@ def make_sample(seed: int, *, seen: bool = True) -> Sample:
     world = np.stack([np.zeros(33), np.linspace(-0.9, 0.9, 33), np.zeros(33)], 1)
     sure = np.ones(33, np.float32)
     exact = Landmarks(image, world.astype(np.float32), sure, sure)
-    return Sample(iuv, alpha, alpha if seen else alpha * 0, exact, exact if seen else None)
+    if not seen:
+        return Sample(iuv, alpha, alpha * 0, exact, None, None)
+    return Sample(iuv, alpha, alpha, exact, exact, seen_features(alpha))
+
+
+def seen_features(alpha: np.ndarray) -> BodyFeatures:
+    """Those of a network that looked at the whole photo: each channel is the mask."""
+    fine, coarse = (cv2.resize(alpha, (n, n), interpolation=cv2.INTER_AREA) for n in (128, 64))
+    maps = (
+        np.repeat(np.float32(each > 127)[..., None], n, 2) for each, n in ((coarse, 48), (fine, 8))
+    )
+    return BodyFeatures(*maps, Region(128, 128, 256))
 
 
 @pytest.fixture
@@ -55,7 +77,9 @@ def test_samples_go_to_disk_and_back(data: Path) -> None:
     assert np.array_equal(first.iuv, make_sample(0).iuv)
     assert first.seen is not None
     assert np.array_equal(first.seen.image, make_sample(0).exact.image)
-    assert second.seen is None
+    assert second.seen is None and second.features is None
+    assert first.features is not None and first.features.region == Region(128, 128, 256)
+    assert np.array_equal(first.features.fine, seen_features(first.alpha).fine)
     (data / "000002_0.npz").write_bytes(b"half")
     with pytest.raises(InputError, match="is damaged"):
         read_sample(data / "000002_0.npz")
@@ -83,29 +107,43 @@ def test_without_augmentation_the_pair_is_the_sample() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_views_move_mask_points_and_answer_together(seed: int) -> None:
-    only_view = Augmentation(0, 0, 0, 0, 0, 0, 0, 0, turn_degrees=25, zoom=0.3, shift=0.1)
+    only_view = replace(NOTHING, turn_degrees=25, zoom=0.3, shift=0.1)
     pair = training_pair(make_sample(seed), only_view, np.random.default_rng(seed))
     assert pair is not None
     body, answer = pair
     solid = body.mask[0, 0].numpy()[::2, ::2] > 0.5
     painted = answer[..., 0] > 0
     assert (solid & painted).sum() / (solid | painted).sum() > 0.95
+    for features in (
+        body.coarse[0, ..., 5].repeat_interleave(2, 0).repeat_interleave(2, 1),
+        body.fine[0, ..., 5],
+    ):
+        known = features.numpy() > 0.5
+        assert (known & painted).sum() / (known | painted).sum() > 0.93
     columns, rows = (body.points[0, 3:-3, :2].numpy().T * 128).astype(int)
     assert painted[rows.clip(0, 127), columns.clip(0, 127)].mean() > 0.95
 
 
-def test_a_cut_takes_person_mask_and_certainty() -> None:
-    only_cut = Augmentation(0, 0, 0, 0, 0, 0, 0, 1.0, 0, 0, 0)
-    certainty = []
-    for seed in range(8):
-        pair = training_pair(make_sample(0), only_cut, np.random.default_rng(seed))
-        assert pair is not None
-        solid, painted = pair[0].mask[0, 0].numpy()[::2, ::2] > 0.5, pair[1][..., 0] > 0
-        assert (solid & painted).sum() / (solid | painted).sum() > 0.93
-        certainty.append(float(pair[0].visibility.min()))
-    # at the sides nothing is lost here, as all points lie in the middle
-    assert min(certainty) < 0.7
-    assert max(certainty) == 1
+def test_some_samples_come_without_features() -> None:
+    for share, expected in ((0, True), (1, False)):
+        pair = training_pair(
+            make_sample(0), replace(NOTHING, blind=share), np.random.default_rng(0)
+        )
+        assert pair is not None and bool(pair[0].coarse.any()) is expected
+
+
+def test_a_cut_photo_ends_in_the_body() -> None:
+    sample = make_sample(0)
+    top, bottom = sample.exact.image[[0, -1], 1]
+    shares = []
+    for seed in range(12):
+        kept = choose_cut(sample.alpha, np.random.default_rng(seed))
+        shares.append((sample.alpha[kept.slices] > 0).sum() / (sample.alpha > 0).sum())
+        cut = cut_landmarks(sample.exact, kept)
+        inside = (sample.exact.image[:, 1] > kept.top) & (sample.exact.image[:, 1] < kept.bottom)
+        assert np.array_equal(cut.presence > 0, inside)
+        assert np.allclose(cut.image[:, 1] + kept.top, np.linspace(top, bottom, 33))
+    assert 0.35 < min(shares) and max(shares) < 0.97
 
 
 def test_the_same_generator_gives_the_same_pair() -> None:
