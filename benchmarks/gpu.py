@@ -24,7 +24,7 @@ import torch
 from workload import SIDE, SOURCE, demo_crops, driver_folder, weights_of
 
 from motion_transfer.drawing.engines import Execution, open_engine
-from motion_transfer.drawing.engines.torch_engine import LANES
+from motion_transfer.drawing.engines.interface import LANES
 from motion_transfer.render.options import SourceOptions
 from motion_transfer.render.source import read_source
 

@@ -21,6 +21,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.drawing.canvas import Frame
+from motion_transfer.drawing.engines.interface import LANES
 from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.renderers.interface import Renderer
 from motion_transfer.drawing.window import Window
@@ -94,7 +95,7 @@ class Engine:
         Raises: the first thread's error, after all threads have stopped; InputError if the run's
             inputs change meanwhile.
         """
-        drawers = {"core": threads, "device": 1, "nothing": 0}[self._renderer.occupies]
+        drawers = {"core": threads, "device": LANES, "nothing": 0}[self._renderer.occupies]
         with (
             one_torch_thread(),
             ThreadPoolExecutor(max(1, drawers), thread_name_prefix="draw") as draw,

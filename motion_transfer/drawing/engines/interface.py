@@ -13,8 +13,11 @@ from nhrr_core.config import ModelConfig
 
 Occupied = Literal["core", "device", "nothing"]
 """What a call keeps busy for long: a `core`, so that there are threads for calls alone, one for
-each worker; the `device`, so that one thread makes them; or `nothing`, and whoever wants a picture
-draws it."""
+each worker; the `device`, so that a few threads make them; or `nothing`, and whoever wants a
+picture draws it."""
+
+LANES = 2
+"""Calls that a device takes at once: while one computes, the other copies."""
 
 KEPT_SIZES = 4
 """Of crops, for which an engine stays ready; each takes memory for its activations."""

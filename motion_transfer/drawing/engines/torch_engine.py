@@ -14,7 +14,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.engines import Execution
-from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
+from motion_transfer.drawing.engines.interface import KEPT_SIZES, LANES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.source import Source
 from motion_transfer.weights.checkpoint import load_checkpoint
@@ -23,7 +23,6 @@ from nhrr_core.config import IUV_CHANNELS
 
 CPU_BATCH = 4
 BATCHES = (48, 24, 16, 12, 8, 6, 4, 3, 2, 1)  # divisors of a chunk's length, which is 48
-LANES = 2  # while one computes, the other copies
 LARGEST_LAYERS = 16  # about so many tensors of the first convolution's size are alive at a time
 MEMORY_SHARE = 0.25  # of what is free
 

@@ -7,7 +7,7 @@ coordinates are pixels with centres at +0.5.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, pi, remainder, sin
 
 import cv2
 import numpy as np
@@ -59,6 +59,13 @@ class Region:
     def is_usable(self) -> bool:
         """Whether it is a square of a size that can be looked at."""
         return bool(np.isfinite([self.x, self.y, self.side, self.turn]).all() and self.side >= 2)
+
+    def change_to(self, other: Region) -> float:
+        """Measure how much another region differs: the most of what it is away and larger or
+        smaller, in shares of this one's side, and turned, in radians."""
+        away = hypot(other.x - self.x, other.y - self.y) / self.side
+        turn = abs(remainder(other.turn - self.turn, 2 * pi))
+        return max(away, abs(other.side / self.side - 1), turn)
 
     def to_frame(self, points: Float32[np.ndarray, "N 2"]) -> Float32[np.ndarray, "N 2"]:
         """Turn the region's own coordinates into frame pixels."""

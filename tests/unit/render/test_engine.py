@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 
+from motion_transfer.drawing.engines.interface import LANES
 from motion_transfer.drawing.renderers.interface import Occupied
 from motion_transfer.errors import RenderError
 from motion_transfer.events import ignore
@@ -88,7 +89,7 @@ def test_the_bytes_do_not_know_who_drew(tmp_path: Path, prepared: Prepared) -> N
     ]
     assert all(result == results[0] for result in results)
     assert len(results[0]) == 2
-    assert [renderer.most for renderer in renderers] == [2, 1, 1, 3]
+    assert [renderer.most for renderer in renderers] == [2, LANES, 1, 3]
     assert [renderer.callers for renderer in renderers] == [{"chunk"}, *[{"draw"}] * 3]
 
 

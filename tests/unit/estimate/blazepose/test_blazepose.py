@@ -23,7 +23,7 @@ from motion_transfer.estimate.blazepose.networks import (
     refine,
 )
 from motion_transfer.estimate.blazepose.retarget import BONES, BodyFit
-from motion_transfer.estimate.blazepose.tracker import BodyTracker
+from motion_transfer.estimate.blazepose.tracker import STEADY, BodyTracker
 from motion_transfer.estimate.clip import estimate_clip, lay_iuv
 from motion_transfer.estimate.interface import LANDMARK, LANDMARK_NAMES
 from motion_transfer.estimate.iuv.network import IuvNetwork, save_weights
@@ -82,7 +82,7 @@ def test_real_photos(models, mediapipe_results, samples: Path, name: str) -> Non
 def test_a_clip_is_followed_as_mediapipe_does(models, mediapipe_results) -> None:
     entry = mediapipe_results["astronaut-clip"]
     photo = data.astronaut()
-    tracker = BodyTracker(most_people=1, smooth=False, second_looks=0)
+    tracker = BodyTracker(most_people=1, smooth=False, second_looks=0, steady=0)
     height = photo.shape[0] - max(y for _, y in entry["shifts"])
     width = photo.shape[1] - max(x for x, _ in entry["shifts"])
     # each frame's region hangs on the last one's points, and only half of him is in the picture:
@@ -229,6 +229,19 @@ def test_somebody_who_leaves_is_lost_and_found_again(estimator) -> None:
     assert estimator.estimate(nobody) == []
     (again,) = estimator.estimate(photo)
     assert again.track > first.track
+
+
+def test_who_stands_still_is_looked_at_through_the_same_pixels(models) -> None:
+    photo, rng = data.astronaut(), np.random.default_rng(0)
+    regions = {0.0: set(), STEADY: set()}
+    for steady, seen in regions.items():
+        tracker = BodyTracker(most_people=1, steady=steady)
+        for _ in range(6):
+            noisy = (photo + rng.normal(0, 3, photo.shape)).round().clip(0, 255).astype(np.uint8)
+            ((_, body),) = tracker.follow(noisy)
+            seen.add(body.region)
+    assert len(regions[0.0]) == 6
+    assert len(regions[STEADY]) <= 2
 
 
 def test_a_clip_is_the_same_however_many_cores_there_are(models, monkeypatch) -> None:

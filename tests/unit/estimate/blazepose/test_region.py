@@ -53,6 +53,15 @@ def test_a_coarse_region_is_averaged_and_in_the_same_place() -> None:
     assert np.abs(seen[32, :, 0] - expected).max() < 2
 
 
+def test_what_changes_a_region_is_measured() -> None:
+    region = Region(100, 100, 200, math.pi - 0.01)
+    assert region.change_to(region) == 0
+    assert region.change_to(Region(103, 96, 200, math.pi - 0.01)) == pytest.approx(5 / 200)
+    assert region.change_to(Region(100, 100, 190, math.pi - 0.01)) == pytest.approx(0.05)
+    # a turn across half a circle is a small one
+    assert region.change_to(Region(100, 100, 200, -math.pi + 0.01)) == pytest.approx(0.02)
+
+
 def test_bad_regions_are_told() -> None:
     assert not Region(0, 0, 0.5).is_usable
     assert not Region(float("nan"), 0, 10).is_usable
