@@ -1,7 +1,7 @@
-"""The network that paints IUV from landmarks and mask: a small U-Net.
+"""The network that paints IUV from what BlazePose finds: a small U-Net.
 
-It never sees the picture, only what BlazePose says of it, so that synthetic people are all it has
-to be trained on. Bones go in as maps; the same numbers as a row also scale and shift the features
+It never sees the picture, only landmarks, mask and the feature maps that BlazePose reads both from.
+Those were learned from real photos, so that synthetic people are all it has to be trained on. Bones go in as maps; the same numbers as a row also scale and shift the features
 of each level (FiLM, Perez et al. 2018), so that far-away joints count everywhere. Its weights are
 one safetensors file with the network's sizes inside.
 """
@@ -49,7 +49,7 @@ class IuvLogits(NamedTuple):
 
 
 class IuvNetwork(nn.Module):
-    """The network: landmarks and mask in; parts, U and V on 128 x 128 out."""
+    """The network: landmarks, mask and features in; parts, U and V on 128 x 128 out."""
 
     def __init__(self, config: IuvNetworkConfig | None = None) -> None:
         super().__init__()

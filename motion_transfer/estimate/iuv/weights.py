@@ -35,7 +35,7 @@ class IuvNetworkConfig:
         code: How many numbers the row of landmarks is condensed to.
     """
 
-    widths: tuple[int, ...] = (32, 56, 96, 144)
+    widths: tuple[int, ...] = (48, 80, 128, 192)
     code: int = 128
 
     def __post_init__(self) -> None:
