@@ -23,6 +23,8 @@ from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
 from motion_transfer.estimate.models import MODEL_FILES, digest, find_model
+from motion_transfer.estimate.surfaces.hand_drawing import lay_hand
+from motion_transfer.estimate.surfaces.hand_landmarks import find_hands
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -79,15 +81,19 @@ class BlazePoseEstimator:
         """
         check_frame(frame)
         seen = self._tracker.follow(np.ascontiguousarray(frame))
-        return partial(self._finish, seen, *frame.shape[:2])
+        return partial(self._finish, seen, frame)
 
     def _finish(
-        self, seen: list[tuple[int, SeenBody]], height: int, width: int
+        self, seen: list[tuple[int, SeenBody]], frame: UInt8[np.ndarray, "H W 3"]
     ) -> list[PersonEstimate]:
-        people = (self._paint(number, body, height, width) for number, body in seen)
+        people = (self._paint(number, body, frame) for number, body in seen)
         return [person for person in people if person is not None]
 
-    def _paint(self, number: int, body: SeenBody, height: int, width: int) -> PersonEstimate | None:
+    def _paint(
+        self, number: int, body: SeenBody, frame: UInt8[np.ndarray, "H W 3"]
+    ) -> PersonEstimate | None:
+        height, width = frame.shape[:2]
+        hands = find_hands(frame, body.landmarks)
         if self._fit is not None:
             body = fit_body(body, self._fit)
         box = _box_on_frame(body, height, width, FAINT)
@@ -97,10 +103,13 @@ class BlazePoseEstimator:
         # the network shrinks the mask to its own size: no need to see it much finer
         mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
         (painted,) = self._network.run(*body_arrays(body.landmarks, mask, window))
+        iuv = paint_iuv(*read_painted(painted), window, box)
+        for hand in hands:
+            lay_hand(iuv, box, hand, body.landmarks)
         return PersonEstimate(
             track=number,
             box=box,
-            iuv=paint_iuv(*read_painted(painted), window, box),
+            iuv=iuv,
             alpha=body.region.paste(np.rint(body.mask * 255).astype(np.uint8), box),
             confidence=body.presence,
             landmarks=body.landmarks,
