@@ -24,6 +24,17 @@ FOREARM_METRES = 0.08  # from the wrist: what is kept of the forearm
 TO_PICTURE = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # x right, y down, z away from who looks
 FINGERS = ("finger1", "finger2", "finger3", "finger4", "finger5")
 BONES = ("forearm", "palm", *(f"{finger}-{joint}" for finger in FINGERS for joint in (1, 2, 3)))
+OFFSETS_MM = (
+    (6.4, 6.7, -9.1),
+    (-16, 4.1, -0.7), (-1.5, 6.3, -9.9), (3.8, 3.8, 0.7), (3.6, -1.8, 4.8),
+    (-4.3, 0.8, 6.7), (-3, 5.6, -3.4), (-2.1, 3.5, -1.9), (-1.1, -2.7, 5.9),
+    (-7.1, -0.3, 3.3), (-3.8, 3.5, -3.6), (-4, 1.3, -0.4), (-3.9, -3.1, 5.3),
+    (-7.7, 0.6, 3), (-3.6, 4.8, -3), (-3.4, 2.7, -1.9), (-4.9, -6.5, 2.2),
+    (-7, -2, 1.4), (-3.8, 3.4, -1.2), (-1.6, 3.3, -2.6), (-2.5, -3.3, -1.5),
+)
+"""From a joint, or a finger's tip, to what the hand network calls the point, in the axes of the
+rest pose. Measured by tools/fit_hand_points.py."""
+
 TIP_POINTS = 12  # the tip is the middle of so many points, those farthest along the last bone
 
 
@@ -79,7 +90,7 @@ def main() -> None:
         faces=local.reshape(-1, 3).astype(np.uint16),
         weights=np.rint(weights[index, :-1] / weights[index, :-1].sum(1, keepdims=True) * 255)
         .astype(np.uint8),
-        joints=np.stack(joints).astype(np.float32),
+        joints=(np.stack(joints) + np.array(OFFSETS_MM) / 1000).astype(np.float32),
         elbow=elbow.astype(np.float32),
         part=np.stack([charts.part[kept], charts.part[others]]),
         uv=np.rint(np.stack(uv) * 255).astype(np.uint8),

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from motion_transfer.drawing.person import Box
+from motion_transfer.estimate.blazepose.hands import find_hands
 from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
@@ -24,7 +25,6 @@ from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
 from motion_transfer.estimate.models import MODEL_FILES, digest, find_model
 from motion_transfer.estimate.surfaces.hand_drawing import lay_hand
-from motion_transfer.estimate.surfaces.hand_landmarks import find_hands
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -105,7 +105,7 @@ class BlazePoseEstimator:
         (painted,) = self._network.run(*body_arrays(body.landmarks, mask, window))
         iuv = paint_iuv(*read_painted(painted), window, box)
         for hand in hands:
-            lay_hand(iuv, box, hand, body.landmarks)
+            lay_hand(iuv, box, hand.side, hand.points, body.landmarks)
         return PersonEstimate(
             track=number,
             box=box,

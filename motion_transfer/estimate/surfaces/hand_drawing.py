@@ -8,21 +8,20 @@ from jaxtyping import Bool, Float32, UInt8
 
 from motion_transfer.drawing.person import Box
 from motion_transfer.estimate.interface import LANDMARK, Landmarks
-from motion_transfer.estimate.surfaces.hand_landmarks import SeenHand
 from motion_transfer.estimate.surfaces.hand_surface import HandSurface, load_hand
 from motion_transfer.estimate.surfaces.raster import draw_charts
 
 PART = {"right": 3, "left": 4}
 AROUND = 0.5  # of the drawn hand's size: so far around it, what was painted of it is its own
-LEAST_SHARED = 0.25
-"""Of a drawn hand's pixels; where fewer were painted as that hand, the body covers it, or it is
-somebody else's. Chosen by eye."""
-
 FINEST = 256  # px; larger hands are drawn at this size, and enlarged
 
 
 def lay_hand(
-    iuv: UInt8[np.ndarray, "h w 3"], box: Box, hand: SeenHand, landmarks: Landmarks
+    iuv: UInt8[np.ndarray, "h w 3"],
+    box: Box,
+    side: str,
+    seen: Float32[np.ndarray, "21 3"],
+    landmarks: Landmarks,
 ) -> None:
     """Draw a hand in place of what was painted of it, in `iuv` itself.
 
@@ -30,11 +29,12 @@ def lay_hand(
 
     Args:
         box: Of the frame; where `iuv` lies.
+        side, seen: The hand, and its 21 points; frame pixels, depth included.
         landmarks: The body's: its elbow tells where the forearm comes from.
     """
-    surface = load_hand(hand.side)
-    elbow, wrist = (landmarks.image[LANDMARK[f"{hand.side}-{name}"]] for name in ("elbow", "wrist"))
-    points = surface.pose(hand.points, wrist - elbow)
+    surface = load_hand(side)
+    elbow, wrist = (landmarks.image[LANDMARK[f"{side}-{name}"]] for name in ("elbow", "wrist"))
+    points = surface.pose(seen, wrist - elbow)
     own = _hand_box(surface, points)
     margin = round(AROUND * max(own.width, own.height))
     place = _within(
@@ -46,10 +46,8 @@ def lay_hand(
     here = iuv[
         place.top - box.top : place.bottom - box.top, place.left - box.left : place.right - box.left
     ]
-    part = PART[hand.side]
+    part = PART[side]
     is_hand, was_hand = drawn[..., 0] == part, here[..., 0] == part
-    if np.count_nonzero(is_hand & was_hand) < LEAST_SHARED * np.count_nonzero(is_hand):
-        return
     _clear(here, was_hand)
     # the forearm's end only where it closes a gap: the network knows the rest of it
     shown = is_hand | ((drawn[..., 0] > 0) & was_hand)

@@ -28,7 +28,15 @@ FIRST_CROP = 2.7  # times twice the way from the wrist to the knuckles
 TOWARDS_TIPS = 0.1  # both crops are moved by this share of their side, away from the wrist
 
 SURE = 0.3  # visibility from which wrist and knuckles of the body are looked at
-LEAST_PRESENCE = 0.7  # chance that a hand is there; a wrong hand is worse than a mitt
+LEAST_PRESENCE = 0.8
+"""Chance that a hand is there. Measured: of synthetic people's hands, those less sure than this are
+drawn no better than the IUV network paints them, all others are (an intersection over union of 0.75
+instead of 0.58)."""
+
+LEAST_SIDE = 0.1
+"""Chance that it is a hand of the side that it is taken for; with less it is the other one, or the
+body's left and right were taken for each other."""
+
 LEAST_SIZE = 16  # px from the wrist to the knuckles' middle, doubled: in smaller ones nothing shows
 
 
@@ -73,8 +81,9 @@ class HandModel:
             return None
         seen = region.cut(frame, LANDMARKS_SIZE)
         outputs = self._landmarker.run(seen[None].astype(np.float32) / 255)
-        points, presence = outputs[0].reshape(-1, 3), float(outputs[1].item())
-        if presence < LEAST_PRESENCE:
+        points, (presence, is_right) = outputs[0].reshape(-1, 3), (o.item() for o in outputs[1:3])
+        of_side = is_right if side == "right" else 1 - is_right
+        if presence < LEAST_PRESENCE or of_side < LEAST_SIDE:
             return None
         on_frame = region.to_frame(points[:, :2] / LANDMARKS_SIZE)
         depth = points[:, 2:] / LANDMARKS_SIZE * region.side
