@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from motion_transfer.drawing.person import Box
-from motion_transfer.estimate.blazepose.hands import find_hands
+from motion_transfer.estimate.blazepose.details import Details, DetailsInFrame, fit_details
 from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
@@ -24,7 +24,7 @@ from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
 from motion_transfer.estimate.models import MODEL_FILES, digest, find_model
-from motion_transfer.estimate.surfaces.hand_drawing import lay_hand
+from motion_transfer.estimate.surfaces.hand_drawing import hand_room, lay_hand
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -62,10 +62,13 @@ class BlazePoseEstimator:
         self._network = network.result()
         self._tracker = BodyTracker(most_people=most_people, smooth=smooth, frame_rate=frame_rate)
         self._fit = fit
+        self._seconds = 1 / frame_rate if smooth else None
+        self._details: DetailsInFrame | None = None
 
     def start_shot(self) -> None:
         """Forget who was where."""
         self._tracker.start_shot()
+        self._details = None
 
     def estimate(self, frame: UInt8[np.ndarray, "H W 3"]) -> list[PersonEstimate]:
         """Find the people of the next frame, the longest known first; maybe nobody.
@@ -81,31 +84,35 @@ class BlazePoseEstimator:
         """
         check_frame(frame)
         seen = self._tracker.follow(np.ascontiguousarray(frame))
-        return partial(self._finish, seen, frame)
+        self._details = DetailsInFrame(frame, seen, self._details, self._seconds)
+        return partial(self._finish, seen, self._details, *frame.shape[:2])
 
     def _finish(
-        self, seen: list[tuple[int, SeenBody]], frame: UInt8[np.ndarray, "H W 3"]
+        self, seen: list[tuple[int, SeenBody]], details: DetailsInFrame, height: int, width: int
     ) -> list[PersonEstimate]:
-        people = (self._paint(number, body, frame) for number, body in seen)
+        people = (
+            self._paint(number, body, details.of(number), height, width) for number, body in seen
+        )
         return [person for person in people if person is not None]
 
     def _paint(
-        self, number: int, body: SeenBody, frame: UInt8[np.ndarray, "H W 3"]
+        self, number: int, body: SeenBody, details: Details, height: int, width: int
     ) -> PersonEstimate | None:
-        height, width = frame.shape[:2]
-        hands = find_hands(frame, body.landmarks)
         if self._fit is not None:
-            body = fit_body(body, self._fit)
+            seen, body = body, fit_body(body, self._fit)
+            details = fit_details(details, seen.landmarks, body.landmarks, self._fit)
         box = _box_on_frame(body, height, width, FAINT)
         if box is None:
             return None
+        for points in details.values():
+            box = hand_room(points, box, height, width)
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
         # the network shrinks the mask to its own size: no need to see it much finer
         mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
         (painted,) = self._network.run(*body_arrays(body.landmarks, mask, window))
         iuv = paint_iuv(*read_painted(painted), window, box)
-        for hand in hands:
-            lay_hand(iuv, box, hand.side, hand.points, body.landmarks)
+        for side, points in details.items():
+            lay_hand(iuv, box, side, points, body.landmarks)
         return PersonEstimate(
             track=number,
             box=box,

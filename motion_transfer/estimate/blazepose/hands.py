@@ -7,7 +7,6 @@ numbers are those of MediaPipe's graphs `hand_landmarks_from_pose_to_recrop_roi`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from math import atan2, hypot, pi
 
@@ -16,7 +15,7 @@ from jaxtyping import Float32, UInt8
 
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.inference import CpuNetwork
-from motion_transfer.estimate.interface import AT_ONCE, LANDMARK, SIDES, Landmarks
+from motion_transfer.estimate.interface import AT_ONCE, LANDMARK, Landmarks
 from motion_transfer.estimate.models import HAND_CROPPER, HAND_LANDMARKER, find_model
 
 POINT_COUNT = 21
@@ -40,22 +39,6 @@ body's left and right were taken for each other."""
 LEAST_SIZE = 16  # px from the wrist to the knuckles' middle, doubled: in smaller ones nothing shows
 
 
-@dataclass(frozen=True)
-class SeenHand:
-    """One hand of somebody.
-
-    Attributes:
-        side: The person's own, `left` or `right`.
-        points: X and y in frame pixels, and depth in the same unit, 0 at the wrist and smaller
-            nearer to the camera.
-        presence: Chance that a hand is there, 0..1.
-    """
-
-    side: str
-    points: Float32[np.ndarray, "21 3"]
-    presence: float
-
-
 class HandModel:
     """The two networks; threads may share it.
 
@@ -68,8 +51,14 @@ class HandModel:
 
     def find(
         self, frame: UInt8[np.ndarray, "H W 3"], landmarks: Landmarks, side: str
-    ) -> SeenHand | None:
-        """Find a hand of somebody whose landmarks are known; None where it is not surely seen."""
+    ) -> Float32[np.ndarray, "21 3"] | None:
+        """Find the points of a hand of somebody whose landmarks are known.
+
+        Args:
+            side: The person's own, `left` or `right`.
+        Returns: X and y in frame pixels, and depth in the same unit, 0 at the wrist and smaller
+            nearer to the camera; None where the hand is not surely seen.
+        """
         rows = [LANDMARK[f"{side}-{name}"] for name in ("wrist", "index", "pinky")]
         if (landmarks.visibility[rows] < SURE).any():
             return None
@@ -87,7 +76,7 @@ class HandModel:
             return None
         on_frame = region.to_frame(points[:, :2] / LANDMARKS_SIZE)
         depth = points[:, 2:] / LANDMARKS_SIZE * region.side
-        return SeenHand(side, np.concatenate([on_frame, depth], 1).astype(np.float32), presence)
+        return np.concatenate([on_frame, depth], 1).astype(np.float32)
 
     def _crop(self, frame: UInt8[np.ndarray, "H W 3"], region: Region) -> Region:
         """Look where in a crop the hand lies."""
@@ -103,11 +92,15 @@ def open_hand_model() -> HandModel:
     return HandModel()
 
 
-def find_hands(frame: UInt8[np.ndarray, "H W 3"], landmarks: Landmarks) -> list[SeenHand]:
+def find_hands(
+    frame: UInt8[np.ndarray, "H W 3"], landmarks: Landmarks
+) -> dict[str, Float32[np.ndarray, "21 3"]]:
     """Find the hands of somebody whose landmarks are known, the farther one first."""
-    sides = sorted(SIDES, key=lambda side: -landmarks.image[LANDMARK[f"{side}-wrist"], 2])
-    found = (open_hand_model().find(frame, landmarks, side) for side in sides)
-    return [hand for hand in found if hand is not None]
+    model = open_hand_model()
+    found = {side: model.find(frame, landmarks, side) for side in ("left", "right")}
+    hands = {side: points for side, points in found.items() if points is not None}
+    far = {side: landmarks.image[LANDMARK[f"{side}-wrist"], 2] for side in hands}
+    return dict(sorted(hands.items(), key=lambda hand: -far[hand[0]]))
 
 
 def first_region(wrist: np.ndarray, index: np.ndarray, pinky: np.ndarray) -> Region:

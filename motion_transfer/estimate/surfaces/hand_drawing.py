@@ -13,7 +13,8 @@ from motion_transfer.estimate.surfaces.raster import draw_charts
 
 PART = {"right": 3, "left": 4}
 AROUND = 0.5  # of the drawn hand's size: so far around it, what was painted of it is its own
-FINEST = 256  # px; larger hands are drawn at this size, and enlarged
+RIM = 0.15  # of the hand's size: so far its surface reaches beyond its points
+FINEST = 512  # px; where there is more around a hand it is drawn at this size, and enlarged
 
 
 def lay_hand(
@@ -35,7 +36,7 @@ def lay_hand(
     surface = load_hand(side)
     elbow, wrist = (landmarks.image[LANDMARK[f"{side}-{name}"]] for name in ("elbow", "wrist"))
     points = surface.pose(seen, wrist - elbow)
-    own = _hand_box(surface, points)
+    own = _box_of(points)
     margin = round(AROUND * max(own.width, own.height))
     place = _within(
         Box(own.left - margin, own.top - margin, own.right + margin, own.bottom + margin), box
@@ -54,6 +55,18 @@ def lay_hand(
     np.copyto(here, drawn, where=shown[..., None])
 
 
+def hand_room(points: Float32[np.ndarray, "21 3"], box: Box, height: int, width: int) -> Box:
+    """Enlarge a person's box, within the frame, to where a hand may be drawn."""
+    low, high = points[:, :2].min(0), points[:, :2].max(0)
+    rim = RIM * (high - low).max()
+    left, top = np.floor(low - rim).clip(0).astype(int)
+    right, bottom = np.ceil(high + rim).clip(max=(width, height)).astype(int)
+    return Box(
+        *(min(box.left, int(left)), min(box.top, int(top))),
+        *(max(box.right, int(right)), max(box.bottom, int(bottom))),
+    )
+
+
 def _clear(iuv: UInt8[np.ndarray, "h w 3"], where: Bool[np.ndarray, "h w"]) -> None:
     """Give pixels what the nearest of the others show; nothing if there are none."""
     if where.all():
@@ -62,6 +75,7 @@ def _clear(iuv: UInt8[np.ndarray, "h w 3"], where: Bool[np.ndarray, "h w"]) -> N
     _, nearest = cv2.distanceTransformWithLabels(
         where.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
+    nearest = np.asarray(nearest, np.int32)
     value = np.zeros((int(nearest.max()) + 1, 3), np.uint8)
     value[nearest[~where]] = iuv[~where]
     iuv[where] = value[nearest[where]]
@@ -80,7 +94,7 @@ def _draw(
     return cv2.resize(drawn, (place.width, place.height), interpolation=cv2.INTER_NEAREST)
 
 
-def _hand_box(surface: HandSurface, points: Float32[np.ndarray, "V 3"]) -> Box:
+def _box_of(points: Float32[np.ndarray, "V 3"]) -> Box:
     low, high = np.floor(points[:, :2].min(0)), np.ceil(points[:, :2].max(0))
     return Box(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
 

@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import as_file, files
 
 import numpy as np
-from jaxtyping import Float32, Integer, UInt8
+from jaxtyping import Float32, Int64, UInt8
 
 SIDES = ("left", "right")
 FOREARM, PALM = 0, 1  # bones; then three of each finger, the thumb first
@@ -34,15 +34,15 @@ class HandSurface:
     """
 
     points: Float32[np.ndarray, "V 3"]
-    faces: Integer[np.ndarray, "F 3"]
+    faces: Int64[np.ndarray, "F 3"]
     weights: Float32[np.ndarray, "V 17"]
     joints: Float32[np.ndarray, "21 3"]
-    elbow: Float32[np.ndarray, "3"]
+    elbow: Float32[np.ndarray, 3]
     part: UInt8[np.ndarray, " F"]
     uv: UInt8[np.ndarray, "F 3 2"]
 
     def pose(
-        self, points: Float32[np.ndarray, "21 3"], forearm: Float32[np.ndarray, "3"] | None = None
+        self, points: Float32[np.ndarray, "21 3"], forearm: Float32[np.ndarray, 3] | None = None
     ) -> Float32[np.ndarray, "V 3"]:
         """Bring the surface to where the 21 points are seen.
 
@@ -74,15 +74,18 @@ class HandSurface:
                 bone = 2 + 3 * finger + joint
                 moved[bone] = _matrix(scale * above @ longer, self.joints[start], points[start])
         blended = np.einsum("vb,bij->vij", self.weights, moved)
-        return (
-            np.einsum("vij,vj->vi", blended[..., :3], self.points) + blended[..., 3]
-        ).astype(np.float32)
+        return (np.einsum("vij,vj->vi", blended[..., :3], self.points) + blended[..., 3]).astype(
+            np.float32
+        )
 
 
 @cache
 def load_hand(side: str) -> HandSurface:
     """Load the hand of a side, once a process; its arrays are shared."""
-    with as_file(files(__package__) / "hand.npz") as path, np.load(path) as table:
+    with (
+        as_file(files("motion_transfer.estimate.surfaces") / "hand.npz") as path,
+        np.load(path) as table,
+    ):
         arrays = dict(table)
     mirror = np.array([-1.0 if side == "right" else 1.0, 1, 1], np.float32)
     number = SIDES.index(side)

@@ -1,9 +1,9 @@
-"""Charted triangles to an IUV image, with depth, in NumPy: a hand's few thousand in milliseconds."""
+"""Charted triangles to an IUV image, with depth, in NumPy: some thousands in milliseconds."""
 
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Float32, Integer, UInt8
+from jaxtyping import Bool, Float32, Int64, UInt8
 
 from motion_transfer.drawing.person import Box
 
@@ -12,7 +12,7 @@ LEAST_AREA = 1e-6  # px², twice a triangle's; smaller ones are seen from their 
 
 def draw_charts(
     points: Float32[np.ndarray, "V 3"],
-    faces: Integer[np.ndarray, "F 3"],
+    faces: Int64[np.ndarray, "F 3"],
     part: UInt8[np.ndarray, " F"],
     uv: UInt8[np.ndarray, "F 3 2"],
     box: Box,
@@ -56,4 +56,3 @@ def draw_charts(
     places = np.einsum("nc,ncu->nu", shares[chosen], uv[which[chosen]].astype(np.float32))
     drawn[covered, 1:] = np.rint(places)
     return drawn
-
