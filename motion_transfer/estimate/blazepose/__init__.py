@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, UInt8
 
 from motion_transfer.drawing.person import Box
+from motion_transfer.estimate.blazepose.details import Details, DetailsInFrame, fit_details
 from motion_transfer.estimate.blazepose.networks import LandmarkModel, PersonDetector, SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
@@ -29,6 +30,7 @@ from motion_transfer.estimate.models import (
     digest,
     find_model,
 )
+from motion_transfer.estimate.surfaces.hand_drawing import hand_room, lay_hand
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -67,10 +69,13 @@ class BlazePoseEstimator:
         self._network = network.result()
         self._tracker = BodyTracker(most_people=most_people, smooth=smooth, frame_rate=frame_rate)
         self._fit = fit
+        self._seconds = 1 / frame_rate if smooth else None
+        self._details: DetailsInFrame | None = None
 
     def start_shot(self) -> None:
         """Forget who was where."""
         self._tracker.start_shot()
+        self._details = None
 
     def estimate(self, frame: UInt8[np.ndarray, "H W 3"]) -> list[PersonEstimate]:
         """Find the people of the next frame, the longest known first; maybe nobody.
@@ -86,29 +91,40 @@ class BlazePoseEstimator:
         """
         check_frame(frame)
         seen = self._tracker.follow(np.ascontiguousarray(frame))
-        return partial(self._finish, seen, *frame.shape[:2])
+        self._details = DetailsInFrame(frame, seen, self._details, self._seconds)
+        return partial(self._finish, seen, self._details, *frame.shape[:2])
 
     def _finish(
-        self, seen: list[tuple[int, SeenBody]], height: int, width: int
+        self, seen: list[tuple[int, SeenBody]], details: DetailsInFrame, height: int, width: int
     ) -> list[PersonEstimate]:
-        people = (self._paint(number, body, height, width) for number, body in seen)
+        # also where nobody is seen: each frame waits for the one before
+        found = details.work_out()
+        people = (self._paint(number, body, found[number], height, width) for number, body in seen)
         return [person for person in people if person is not None]
 
-    def _paint(self, number: int, body: SeenBody, height: int, width: int) -> PersonEstimate | None:
+    def _paint(
+        self, number: int, body: SeenBody, details: Details, height: int, width: int
+    ) -> PersonEstimate | None:
         if self._fit is not None:
-            body = fit_body(body, self._fit)
+            seen, body = body, fit_body(body, self._fit)
+            details = fit_details(details, seen.landmarks, body.landmarks, self._fit)
         box = _box_on_frame(body, height, width, FAINT)
         if box is None:
             return None
+        for points in details.values():
+            box = hand_room(points, box, height, width)
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
         # the network shrinks the mask to its own size: no need to see it much finer
         mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
         features = body.features.look(_into(window)) if body.features else None
         (painted,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
+        iuv = paint_iuv(*read_painted(painted), window, box)
+        for side, points in details.items():
+            lay_hand(iuv, box, side, points, body.landmarks)
         return PersonEstimate(
             track=number,
             box=box,
-            iuv=paint_iuv(*read_painted(painted), window, box),
+            iuv=iuv,
             alpha=body.region.paste(np.rint(body.mask * 255).astype(np.uint8), box),
             confidence=body.presence,
             landmarks=body.landmarks,

@@ -13,7 +13,7 @@ REFERENCE = Path(__file__).parents[2] / "reference/blazepose_landmarks.json"
 
 @pytest.fixture(scope="session")
 def models() -> dict[str, Path]:
-    """The two model files by name."""
+    """The model files by name."""
     return find_models()
 
 

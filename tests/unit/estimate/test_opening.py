@@ -56,7 +56,7 @@ def test_facts_tell_which_models_look(tmp_path: Path) -> None:
         facts.append(estimator_facts("densepose", tmp_path / "m.pt"))
     assert facts[0] == facts[2] != facts[1]
     own = estimator_facts("blazepose", None)
-    assert own["estimator"] == "blazepose" and len(own["models"]) == 2 and own["network"]
+    assert own["estimator"] == "blazepose" and len(own["models"]) == 5 and own["network"]
     with pytest.raises(InputError, match=r"gone\.pt does not exist"):
         estimator_facts("densepose", tmp_path / "gone.pt")
 

@@ -12,7 +12,7 @@ from motion_transfer.estimate.models import MODEL_FILES, find_model
 
 @pytest.fixture(scope="session")
 def models() -> dict[str, Path]:
-    """The two model files by name."""
+    """The model files by name."""
     try:
         return {file.name: find_model(file) for file in MODEL_FILES}
     except InputError as error:

@@ -1,0 +1,101 @@
+"""Hands and faces of the people in a frame, seen by networks of their own and steadied over time.
+
+A detail is an array of points on the frame; its name is a side's hand (`left`, `right`) or `face`.
+Frames are finished side by side, so a frame's details are found whenever a thread comes to them,
+but steadied in the order of the frames: whoever needs those of a frame first finds those of the
+frames before, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from threading import Lock
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from motion_transfer.estimate.blazepose.hands import find_hands
+from motion_transfer.estimate.blazepose.networks import SeenBody
+from motion_transfer.estimate.blazepose.retarget import BodyFit
+from motion_transfer.estimate.blazepose.tracker import OneEuroFilter
+from motion_transfer.estimate.interface import LANDMARK, Landmarks
+
+Details = dict[str, Float32[np.ndarray, "N 3"]]
+Filters = dict[tuple[int, str], OneEuroFilter]
+
+SMOOTHING = (1.0, 20.0)
+"""Cut-off and gain of a `OneEuroFilter`, the size being the detail's own."""
+
+
+class DetailsInFrame:
+    """The details of everybody in a frame; threads may share it.
+
+    Args:
+        before: Those of the frame before, of the same shot.
+        seconds: Since then, for smoothing; None smooths nothing.
+    """
+
+    def __init__(
+        self,
+        frame: UInt8[np.ndarray, "H W 3"],
+        people: Sequence[tuple[int, SeenBody]],
+        before: DetailsInFrame | None,
+        seconds: float | None,
+    ) -> None:
+        self._find = partial(_find_details, frame, people)
+        self._before = before if seconds else None
+        self._seconds = seconds
+        self._lock = Lock()
+        self._found: dict[int, Details] | None = None
+        self._filters: Filters = {}
+
+    def work_out(self) -> dict[int, Details]:
+        """Find the details of everybody, by their tracks' numbers, unless that was done before."""
+        with self._lock:
+            if self._found is None:
+                found = self._find()
+                if self._before is not None:
+                    self._before.work_out()
+                    self._filters = self._before._filters
+                if self._seconds:
+                    found = self._smooth(found, self._seconds)
+                self._found = found
+                # nobody asks for frames and details of the past any more
+                self._find, self._before = dict, None
+            return self._found
+
+    def _smooth(self, found: dict[int, Details], seconds: float) -> dict[int, Details]:
+        # one that was not seen in the frame before begins anew
+        seen = [(person, name) for person, details in found.items() for name in details]
+        self._filters = {key: self._filters.get(key) or OneEuroFilter(*SMOOTHING) for key in seen}
+        for person, name in seen:
+            points = found[person][name]
+            size = max(1.0, float(np.ptp(points[:, :2], axis=0).max()))
+            found[person][name] = self._filters[person, name](points, seconds, size)
+        return found
+
+
+def _find_details(
+    frame: UInt8[np.ndarray, "H W 3"], people: Sequence[tuple[int, SeenBody]]
+) -> dict[int, Details]:
+    return {number: find_hands(frame, body.landmarks) for number, body in people}
+
+
+ANCHORS: dict[str, tuple[str, str]] = {
+    "left": ("left-wrist", "lower-arm"),
+    "right": ("right-wrist", "lower-arm"),
+    "face": ("nose", "head"),
+}
+"""The landmark that a detail hangs on, and the bone whose scale is its own."""
+
+
+def fit_details(details: Details, seen: Landmarks, fitted: Landmarks, fit: BodyFit) -> Details:
+    """Bring details to where the fitted body has them."""
+    moved: Details = {}
+    for name, points in details.items():
+        landmark, bone = ANCHORS[name]
+        place, scale = LANDMARK[landmark], fit.scales[bone]
+        moved[name] = points * np.float32(scale)
+        moved[name][:, :2] += fitted.image[place, :2] - scale * seen.image[place, :2]
+    return moved
