@@ -1,9 +1,10 @@
 """The network that paints IUV from what BlazePose finds: a small U-Net.
 
 It never sees the picture, only landmarks, mask and the feature maps that BlazePose reads both from.
-Those were learned from real photos, so that synthetic people are all it has to be trained on. Bones go in as maps; the same numbers as a row also scale and shift the features
-of each level (FiLM, Perez et al. 2018), so that far-away joints count everywhere. Its weights are
-one safetensors file with the network's sizes inside.
+Those were learned from real photos, so that synthetic people are all it has to be trained on. Bones
+go in as maps; the same numbers as a row also scale and shift the features of each level (FiLM,
+Perez et al. 2018), so that far-away joints count everywhere. Its weights are one safetensors file
+with the network's sizes inside.
 """
 
 from __future__ import annotations
