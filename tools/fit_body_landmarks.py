@@ -1,4 +1,4 @@
-"""Measure where BlazePose sees its landmarks on synthetic people, for training/iuv/samples.py.
+"""Measure where BlazePose sees its landmarks on synthetic people, for tracking/landmarks.py.
 
     python tools/fit_body_landmarks.py [--people 150]
 
@@ -18,14 +18,14 @@ import numpy as np
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
 from motion_transfer.estimate.interface import LANDMARK_NAMES, Landmarks
 from motion_transfer.people import Camera, PeopleStream, load_body_model
-from motion_transfer.training.iuv.samples import (
+from motion_transfer.tracking.landmarks import (
     ANCHORS,
     anchor_of,
     carrying_bones,
     exact_landmarks,
-    find_body,
     rest_places,
 )
+from motion_transfer.training.iuv.samples import find_body
 
 ROUNDS = 12
 NEAR = 0.008

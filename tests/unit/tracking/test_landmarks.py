@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,16 +13,7 @@ from motion_transfer.estimate.interface import LANDMARK, LANDMARK_NAMES
 from motion_transfer.people.figure.body import load_body_model
 from motion_transfer.people.figure.camera import frame_points
 from motion_transfer.people.motion.poses import Arm, Pose, posed
-from motion_transfer.training.iuv.samples import (
-    ANCHORS,
-    SampleOptions,
-    anchor_of,
-    exact_landmarks,
-    list_samples,
-    make_samples,
-    posed_places,
-    read_sample,
-)
+from motion_transfer.tracking.landmarks import ANCHORS, anchor_of, exact_landmarks, posed_places
 
 
 def seen_from(azimuth: float, pose: Pose | None = None):
@@ -81,24 +71,3 @@ def test_what_is_behind_the_body_is_not_visible() -> None:
     side, _, _ = seen_from(90)
     assert side.visibility[LANDMARK["right-shoulder"]] == 0
     assert side.visibility[LANDMARK["left-shoulder"]] == 1
-
-
-def test_blazepose_sees_them_there(models, tmp_path: Path) -> None:
-    options = SampleOptions(out=tmp_path / "data", people=3, views=2, split="held-out", workers=1)
-    assert make_samples(options) == 3
-    away = []
-    for file in list_samples(options.out):
-        sample = read_sample(file)
-        assert sample.iuv.shape == (256, 256, 3)
-        if sample.seen is not None:
-            tall = np.ptp(sample.exact.image[:, 1])
-            shown = sample.exact.visibility > 0.5
-            moves = (sample.seen.image - sample.exact.image)[shown, :2]
-            away.append(np.median(np.linalg.norm(moves, axis=1)) / tall)
-            person = sample.alpha > 127
-            assert ((sample.mask > 127) & person).sum() / person.sum() > 0.8
-    assert len(away) >= 4
-    assert np.median(away) < 0.02
-    before = sorted(path.read_bytes() for path in list_samples(options.out))
-    assert make_samples(options) == 0
-    assert sorted(path.read_bytes() for path in list_samples(options.out)) == before

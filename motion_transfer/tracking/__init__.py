@@ -1,0 +1,1 @@
+"""The body model fitted to people in clips: a clip becomes 3D motion."""
