@@ -1,0 +1,271 @@
+"""A body fitted to the landmarks of one shot: all frames at once, so that nothing lags.
+
+What is made small, by Gauss-Newton steps: how far landmarks are from where the picture shows them,
+and (counting less) from BlazePose's metres; how much joints leave their usual angles; and how
+suddenly they move. Landmarks that do not fit the rest count less and less (Cauchy's weights), and
+so do sudden movements if the picture insists on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float64
+from scipy.linalg import solveh_banded
+
+from motion_transfer.estimate.interface import LANDMARK
+from motion_transfer.tracking.puppet import LAYOUT, PARAMETERS, Postures, Puppet
+from motion_transfer.tracking.starting import Observed, find_flipped, first_postures, unflipped
+
+Blocks = Float64[np.ndarray, "N P P"]
+
+STEPS = 14
+"""Gauss-Newton's; measured: later ones move no joint by a millimetre."""
+
+IMAGE_SIGMA = 0.012
+"""How far BlazePose's landmarks are off in the picture, as a share of the body's height there."""
+
+WORLD_SIGMA = np.array([0.07, 0.14, 0.07])
+"""How far its metres are off: across, in depth, up."""
+
+CAUCHY = 2.5
+"""Sigmas from which a landmark counts less and less."""
+
+REST_STEP = 1e-3
+"""Curvature added to every number, so that a step is found where nothing is known."""
+
+HIPS = [LANDMARK["left-hip"], LANDMARK["right-hip"]]
+
+
+def _degrees(**sigmas: tuple[float, ...]) -> dict[str, np.ndarray]:
+    return {name: np.radians(values) for name, values in sigmas.items()}
+
+
+USUAL = _degrees(
+    spine=(20, 12, 15),
+    neck=(20, 15, 30),
+    arm=(90, 60, 40),
+    elbow=(90,),
+    hand=(15, 30, 40),
+    leg=(60, 25, 25),
+    knee=(90,),
+    foot=(20, 10, 8),
+)
+"""How far joints usually are from the zero pose: bends sideways and turns about a limb's length
+are smaller than lifts. By eye."""
+
+ACCELERATION = {
+    **_degrees(
+        pelvis=(1.0, 1.0, 1.5),
+        spine=(0.5, 0.5, 0.5),
+        neck=(0.8, 0.8, 1.0),
+        arm=(2.5, 2.5, 2.5),
+        elbow=(2.5,),
+        hand=(2.0, 2.0, 2.0),
+        leg=(1.8, 1.8, 1.2),
+        knee=(2.5,),
+        foot=(1.8, 1.2, 0.8),
+    ),
+    "place": np.array([0.008, 0.006, 0.008]),
+}
+"""How much the speed usually changes from one frame to the next at 30 frames a second."""
+
+SUDDEN = 2.0
+"""Sigmas from which a change of speed counts less and less."""
+
+VELOCITY_SHARE = 1 / 12
+"""Of a change of speed's sigma over that of speed: keeps bodies where they were last seen."""
+
+BEND_LIMITS = np.radians([0, 150])
+LIMIT_SIGMA = np.radians(3)
+
+
+@dataclass(frozen=True)
+class View:
+    """A level camera at the world's origin that looks along y.
+
+    Attributes:
+        focal: Pixels.
+        centre: Of the picture, px.
+    """
+
+    focal: float
+    centre: tuple[float, float]
+
+
+def fit_postures(
+    puppet: Puppet, observed: Observed, view: View, frame_rate: float
+) -> tuple[Postures, int]:
+    """Fit a body to one shot.
+
+    Returns: Its postures, and in how many frames left and right were exchanged.
+    """
+    flipped = find_flipped(observed, frame_rate)
+    observed = unflipped(observed, flipped)
+    postures = first_postures(puppet, observed, view.focal, view.centre)
+    postures = refine(puppet, postures, observed, view, frame_rate)
+    return postures, int(flipped.sum())
+
+
+def refine(
+    puppet: Puppet,
+    postures: Postures,
+    observed: Observed,
+    view: View,
+    frame_rate: float,
+    steps: int = STEPS,
+) -> Postures:
+    """Take Gauss-Newton steps towards what was observed."""
+    moments = Moments.at(frame_rate)
+    tall = view.focal * puppet.body.height / np.median(postures.place[observed.seen, 1])
+    for step in range(steps):
+        # wide at first: far-off starts must not be taken for outliers
+        width = CAUCHY * max(1.0, 8.0 / 2**step)
+        blocks, right = _data_terms(puppet, postures, observed, view, tall, width)
+        _add_habits(postures, blocks, right)
+        band = Band(blocks)
+        moments.add(postures, band, right)
+        postures = postures.turned(band.solve(right))
+    return postures
+
+
+def _data_terms(
+    puppet: Puppet,
+    postures: Postures,
+    observed: Observed,
+    view: View,
+    tall: float,
+    width: float,
+) -> tuple[Blocks, Float64[np.ndarray, "N P"]]:
+    placed = puppet.place(postures)
+    points, slopes = placed.landmarks, placed.slopes()
+    x, depth, z = np.moveaxis(points, -1, 0)
+    depth = np.maximum(depth, 0.1)
+    scale = view.focal / depth
+    centre = np.array(view.centre)
+    away = np.stack([x * scale, -z * scale], -1) + centre - observed.image
+    # how the picture moves with a point: columns x, y (into it), z
+    u = scale[..., None] * (slopes[:, :, 0] - (x / depth)[..., None] * slopes[:, :, 1])
+    v = scale[..., None] * (-slopes[:, :, 2] + (z / depth)[..., None] * slopes[:, :, 1])
+    sigma = IMAGE_SIGMA * tall
+    weight = observed.weight * _cauchy((away**2).sum(-1) / sigma**2, width) / sigma**2
+    rows = np.stack([u, v], 2)
+    residuals, weights = [away], [np.repeat(weight[..., None], 2, -1)]
+    slope_rows = [rows]
+    hips = points[:, HIPS].mean(1, keepdims=True)
+    apart = (points - hips - observed.world) / WORLD_SIGMA
+    slopes = (slopes - slopes[:, HIPS].mean(1, keepdims=True)) / WORLD_SIGMA[:, None]
+    weight = observed.weight * _cauchy((apart**2).sum(-1), width)
+    residuals.append(apart)
+    weights.append(np.repeat(weight[..., None], 3, -1))
+    slope_rows.append(slopes)
+    count = len(postures)
+    j = np.concatenate(slope_rows, 2).reshape(count, -1, PARAMETERS)
+    w = np.concatenate(weights, 2).reshape(count, -1)
+    r = np.concatenate(residuals, 2).reshape(count, -1)
+    weighted = j * w[..., None]
+    return weighted.swapaxes(1, 2) @ j, -np.einsum("nrp,nr->np", weighted, r)
+
+
+def _cauchy(squares: np.ndarray, width: float) -> np.ndarray:
+    return 1 / (1 + squares / width**2)
+
+
+def _add_habits(postures: Postures, blocks: Blocks, right: Float64[np.ndarray, "N P"]) -> None:
+    """Pull joints towards usual angles, and elbows and knees strongly into what they can do."""
+    count = len(postures)
+    still = np.tile(np.eye(3), (count, 1, 1))
+    both = np.tile(np.eye(3), (count, 2, 1, 1))
+    none, bends = np.zeros((count, 3)), np.zeros((count, 2))
+    zero = Postures(postures.place, postures.pelvis, none, none, both, bends, both, both, bends, both)
+    del still
+    away = postures.away_from(zero)
+    curvature = np.full((count, PARAMETERS), REST_STEP)
+    for name, part in LAYOUT.items():
+        kind = name.split(".")[0]
+        if kind not in USUAL:
+            continue
+        stiffness = 1 / USUAL[kind] ** 2
+        curvature[:, part] += stiffness
+        right[:, part] -= stiffness * away[:, part]
+        if kind in ("elbow", "knee"):
+            beyond = away[:, part] - np.clip(away[:, part], *BEND_LIMITS)
+            outside = (beyond != 0) / LIMIT_SIGMA**2
+            curvature[:, part] += outside
+            right[:, part] -= outside * beyond
+    diagonal = np.arange(PARAMETERS)
+    blocks[:, diagonal, diagonal] += curvature
+
+
+@dataclass(frozen=True)
+class Moments:
+    """How stiff movements are: of each number, against speed and changes of speed."""
+
+    speed: Float64[np.ndarray, " P"]
+    change: Float64[np.ndarray, " P"]
+
+    @classmethod
+    def at(cls, frame_rate: float) -> Moments:
+        """Scale the sigmas to a frame rate."""
+        sigma = np.empty(PARAMETERS)
+        for name, part in LAYOUT.items():
+            sigma[part] = ACCELERATION[name.split(".")[0]]
+        change = sigma * (30 / frame_rate) ** 2
+        speed = sigma * (30 / frame_rate) / VELOCITY_SHARE
+        return cls(1 / speed**2, 1 / change**2)
+
+    def add(self, postures: Postures, band: Band, right: Float64[np.ndarray, "N P"]) -> None:
+        """Add the terms that tie frames to the next ones."""
+        if len(postures) < 2:
+            return
+        moves = postures[slice(1, None)].away_from(postures[slice(None, -1)])
+        stiff = np.broadcast_to(self.speed, moves.shape)
+        band.add_chain([-1.0, 1.0], stiff)
+        right[1:] -= stiff * moves
+        right[:-1] += stiff * moves
+        if len(postures) < 3:
+            return
+        bends = moves[1:] - moves[:-1]
+        stiff = self.change * _grouped_cauchy(bends**2 * self.change)
+        band.add_chain([1.0, -2.0, 1.0], stiff)
+        right[2:] -= stiff * bends
+        right[1:-1] += 2 * stiff * bends
+        right[:-2] -= stiff * bends
+
+
+def _grouped_cauchy(squares: Float64[np.ndarray, "N P"]) -> Float64[np.ndarray, "N P"]:
+    """Weigh the numbers of one joint alike."""
+    out = np.empty_like(squares)
+    for part in LAYOUT.values():
+        out[:, part] = _cauchy(squares[:, part].mean(1, keepdims=True), SUDDEN)
+    return out
+
+
+class Band:
+    """The normal equations of all frames, of which only near ones are tied; lower band storage.
+
+    Args:
+        blocks: What stands on the diagonal, a block a frame.
+    """
+
+    def __init__(self, blocks: Blocks) -> None:
+        count, size = blocks.shape[:2]
+        self._size = size
+        self._rows = np.zeros((2 * size + 1, count, size))
+        row, column = np.tril_indices(size)
+        self._rows[row - column, :, column] = blocks[:, row, column].T
+
+    def add_chain(self, factors: list[float], stiff: Float64[np.ndarray, "M P"]) -> None:
+        """Add stiffness against a weighted sum of each number over successive frames."""
+        length = len(stiff)
+        for i, first in enumerate(factors):
+            for j, second in enumerate(factors[: i + 1]):
+                self._rows[(i - j) * self._size, j : j + length] += first * second * stiff
+
+    def solve(self, right: Float64[np.ndarray, "N P"]) -> Float64[np.ndarray, "N P"]:
+        """Solve for the step of all frames."""
+        band = self._rows.reshape(len(self._rows), -1)
+        return solveh_banded(band, right.ravel(), lower=True, check_finite=False).reshape(
+            right.shape
+        )
