@@ -178,7 +178,9 @@ def _add_habits(postures: Postures, blocks: Blocks, right: Float64[np.ndarray, "
     still = np.tile(np.eye(3), (count, 1, 1))
     both = np.tile(np.eye(3), (count, 2, 1, 1))
     none, bends = np.zeros((count, 3)), np.zeros((count, 2))
-    zero = Postures(postures.place, postures.pelvis, none, none, both, bends, both, both, bends, both)
+    zero = Postures(
+        postures.place, postures.pelvis, none, none, both, bends, both, both, bends, both
+    )
     del still
     away = postures.away_from(zero)
     curvature = np.full((count, PARAMETERS), REST_STEP)

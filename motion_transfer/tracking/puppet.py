@@ -42,6 +42,7 @@ RELAXED = 0.3  # curl of the fingers; landmarks do not say it
 HANDS = ("pinky", "index", "thumb")
 ARM_DOWN = np.array([0.0, 0.0, -1.0])
 MIRROR = np.array([-1.0, 1.0, 1.0])
+HEEL_BEHIND = 0.05  # metres that the heel lies behind the ankle joint
 MOST_TURN = 0.6  # radians, of one step: farther away nothing is linear
 
 
@@ -234,6 +235,25 @@ class Puppet:
             self._place_arm(out, handles, postures, i, side, chest, chest_place)
             self._place_leg(out, handles, postures, i, side)
         return Placed(out, handles)
+
+    def soles(self, postures: Postures) -> Points:
+        """Place heels and balls of both feet, on the ground under them, in all frames."""
+        places = []
+        for i, side in enumerate("LR"):
+            own = mirrored_matrix if i else np.asarray
+            upper = postures.pelvis @ postures.leg[:, i]
+            bent = upper @ about_x(postures.knee[:, i])
+            foot = bent @ postures.foot[:, i]
+            hip, knee, ankle, toe = (
+                self.joint(f"{name}.{side}")
+                for name in ("upperleg01", "lowerleg01", "foot", "toe2-2")
+            )
+            here = postures.place + _applied(postures.pelvis, hip - self.joint("root"))
+            here = here + _applied(upper @ own(self.rest.leg), knee - hip)
+            here = here + _applied(bent @ own(self.rest.leg), ankle - knee)
+            heel = np.array([ankle[0], ankle[1] + HEEL_BEHIND, 0.0])
+            places += [here + _applied(foot, sole - ankle) for sole in (heel, toe * [1, 1, 0])]
+        return np.stack(places, 1)
 
     def _place_arm(
         self,

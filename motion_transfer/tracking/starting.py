@@ -44,6 +44,10 @@ class Observed:
     def __len__(self) -> int:
         return len(self.image)
 
+    def __getitem__(self, frames: slice) -> Observed:
+        """Take some of the frames."""
+        return Observed(self.image[frames], self.world[frames], self.weight[frames])
+
     @property
     def seen(self) -> Bool[np.ndarray, " N"]:
         """Which frames show somebody."""
@@ -73,9 +77,7 @@ def observe(found: list[Landmarks | None]) -> Observed:
 
 
 OTHER_SIDE = [
-    LANDMARK[
-        name.replace("left", "?").replace("right", "left").replace("?", "right")
-    ]
+    LANDMARK[name.replace("left", "?").replace("right", "left").replace("?", "right")]
     for name in LANDMARK_NAMES
 ]
 """For each landmark the same one of the other side."""
@@ -137,7 +139,9 @@ def first_postures(
     def at(name: str) -> Vectors:
         return world[:, LANDMARK[name]]
 
-    trunk = [LANDMARK[f"{side}-{name}"] for side in ("left", "right") for name in ("shoulder", "hip")]
+    trunk = [
+        LANDMARK[f"{side}-{name}"] for side in ("left", "right") for name in ("shoulder", "hip")
+    ]
     pelvis = aligned(rest[trunk], world[:, trunk])
     head = aligned(rest[GROUPS["head"]], world[:, GROUPS["head"]])
     neck = Rotation.from_matrix(pelvis.swapaxes(1, 2) @ head).as_rotvec()

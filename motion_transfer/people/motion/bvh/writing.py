@@ -106,14 +106,14 @@ def write_bvh(
     Returns: How many frames.
     """
     rows = [_row(body, *frame) for frame in frames]
-    lines = ["HIERARCHY", *_skeleton(body, 0, 0), "MOTION", f"Frames: {len(rows)}"]
+    lines = ["HIERARCHY", *_skeleton(body, 0), "MOTION", f"Frames: {len(rows)}"]
     lines += [f"Frame Time: {float(1 / frame_rate):.9f}"]
     lines += [" ".join(f"{number:.5f}" for number in row) for row in rows]
     path.write_text("\n".join(lines) + "\n")
     return len(rows)
 
 
-def _skeleton(body: Body, index: int, depth: int) -> list[str]:
+def _skeleton(body: Body, index: int) -> list[str]:
     """Describe a joint and all below it."""
     joint, parent = JOINTS[index], PARENTS[index]
     here = body.joint(joint.bone)
@@ -124,13 +124,12 @@ def _skeleton(body: Body, index: int, depth: int) -> list[str]:
     lines = [f"OFFSET {_shown(offset)}", f"CHANNELS {channels}"]
     for child, above in enumerate(PARENTS):
         if above == index:
-            lines += _skeleton(body, child, 1)
+            lines += _skeleton(body, child)
     if index not in PARENTS:
         end = body.joint(joint.end) - here if joint.end else CROWN
         lines += ["End Site", "{", f"\tOFFSET {_shown(end)}", "}"]
     kind = "JOINT" if parent >= 0 else "ROOT"
-    inner = [f"\t{line}" for line in lines]
-    return [("\t" * depth) + line for line in (f"{kind} {joint.name}", "{", *inner, "}")]
+    return [f"{kind} {joint.name}", "{", *(f"\t{line}" for line in lines), "}"]
 
 
 def _shown(vector: np.ndarray) -> str:
