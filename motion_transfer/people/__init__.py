@@ -53,21 +53,26 @@ if TYPE_CHECKING:
         finger_bones,
         leg_bones,
         mirrored_matrix,
+        rotation,
+        turned,
         whole_body,
     )
+    from motion_transfer.people.motion.pose_sampler import sample_pose
+    from motion_transfer.people.motion.poses import Arm, Leg, Pose, arm_chain, leg_chain
     from motion_transfer.people.person import DressedPerson, Person, sample_person
     from motion_transfer.people.photo import PersonPhoto, Shot, sample_shot
     from motion_transfer.people.picture.iuv_noise import IuvNoise
 
 __all__ = [
-    "ARM_AT_ZERO", "FIRST_USE", "HELPERS_FIRST_USE", "LEG_AT_ZERO", "NECK", "SCHEME", "SPINE", "AlbumOptions", "Body",
-    "BodyModel", "Bones", "Camera", "DressedPerson", "FreePerson", "IuvNoise", "MotionDriver",
-    "MotionOptions", "PeopleDataset", "PeopleStream", "Person", "PersonPhoto", "PosedBody", "Rest",
-    "Shape", "Shot", "Split", "Triangles", "are_helpers_cached", "arm_bones", "check_motion",
-    "check_share", "depths", "find_assets", "finger_bones", "is_cached", "is_motion", "leg_bones",
+    "ARM_AT_ZERO", "FIRST_USE", "HELPERS_FIRST_USE", "LEG_AT_ZERO", "NECK", "SCHEME", "SPINE",
+    "AlbumOptions", "Arm", "Body", "BodyModel", "Bones", "Camera", "DressedPerson", "FreePerson",
+    "IuvNoise", "Leg", "MotionDriver", "MotionOptions", "PeopleDataset", "PeopleStream", "Person",
+    "PersonPhoto", "Pose", "PosedBody", "Rest", "Shape", "Shot", "Split", "Triangles",
+    "are_helpers_cached", "arm_bones", "arm_chain", "check_motion", "check_share", "depths",
+    "find_assets", "finger_bones", "is_cached", "is_motion", "leg_bones", "leg_chain",
     "load_assets", "load_body_model", "load_charts", "load_helpers", "mirrored_matrix",
-    "open_motion", "rasterise", "record_motion", "render_iuv", "sample_person", "sample_shot",
-    "whole_body", "write_album", "write_bvh",
+    "open_motion", "rasterise", "record_motion", "render_iuv", "rotation", "sample_person",
+    "sample_pose", "sample_shot", "turned", "whole_body", "write_album", "write_bvh",
 ]  # fmt: skip
 
 _NAMES_OF = {
@@ -84,7 +89,9 @@ _NAMES_OF = {
     "free.person": "FreePerson",
     "motion.bvh.writing": "write_bvh",
     "motion.limbs": "ARM_AT_ZERO LEG_AT_ZERO NECK SPINE Bones Rest arm_bones finger_bones leg_bones mirrored_matrix"
-    " whole_body",
+    " rotation turned whole_body",
+    "motion.pose_sampler": "sample_pose",
+    "motion.poses": "Arm Leg Pose arm_chain leg_chain",
     "person": "DressedPerson Person sample_person",
     "photo": "PersonPhoto Shot sample_shot",
     "picture.iuv_noise": "IuvNoise",

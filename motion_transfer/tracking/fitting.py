@@ -15,6 +15,7 @@ from jaxtyping import Float64
 from scipy.linalg import solveh_banded
 
 from motion_transfer.estimate.interface import LANDMARK
+from motion_transfer.tracking.habits import usual_habits
 from motion_transfer.tracking.puppet import LAYOUT, PARAMETERS, Postures, Puppet
 from motion_transfer.tracking.starting import Observed, find_flipped, first_postures, unflipped
 
@@ -26,14 +27,12 @@ STEPS = 14
 IMAGE_SIGMA = 0.012
 """How far BlazePose's landmarks are off in the picture, as a share of the body's height there."""
 
-WORLD_SIGMA = np.array([0.07, 0.14, 0.07])
-"""How far its metres are off: across, in depth, up."""
+WORLD_SIGMA = np.array([0.2, 0.15, 0.2])
+"""How far its metres are off: across, in depth, up. Measured on synthetic people: 0.05, 0.1, 0.1;
+but wrong metres stay wrong for many frames, and the picture knows better what is across or up."""
 
-CAUCHY = 2.5
+CAUCHY = 1.5
 """Sigmas from which a landmark counts less and less."""
-
-REST_STEP = 1e-3
-"""Curvature added to every number, so that a step is found where nothing is known."""
 
 HIPS = [LANDMARK["left-hip"], LANDMARK["right-hip"]]
 
@@ -41,19 +40,6 @@ HIPS = [LANDMARK["left-hip"], LANDMARK["right-hip"]]
 def _degrees(**sigmas: tuple[float, ...]) -> dict[str, np.ndarray]:
     return {name: np.radians(values) for name, values in sigmas.items()}
 
-
-USUAL = _degrees(
-    spine=(20, 12, 15),
-    neck=(20, 15, 30),
-    arm=(90, 60, 40),
-    elbow=(90,),
-    hand=(15, 30, 40),
-    leg=(60, 25, 25),
-    knee=(90,),
-    foot=(20, 10, 8),
-)
-"""How far joints usually are from the zero pose: bends sideways and turns about a limb's length
-are smaller than lifts. By eye."""
 
 ACCELERATION = {
     **_degrees(
@@ -76,10 +62,6 @@ SUDDEN = 2.0
 
 VELOCITY_SHARE = 1 / 12
 """Of a change of speed's sigma over that of speed: keeps bodies where they were last seen."""
-
-BEND_LIMITS = np.radians([0, 150])
-LIMIT_SIGMA = np.radians(3)
-
 
 @dataclass(frozen=True)
 class View:
@@ -117,13 +99,13 @@ def refine(
     steps: int = STEPS,
 ) -> Postures:
     """Take Gauss-Newton steps towards what was observed."""
-    moments = Moments.at(frame_rate)
+    moments, habits = Moments.at(frame_rate), usual_habits()
     tall = view.focal * puppet.body.height / np.median(postures.place[observed.seen, 1])
     for step in range(steps):
         # wide at first: far-off starts must not be taken for outliers
         width = CAUCHY * max(1.0, 8.0 / 2**step)
         blocks, right = _data_terms(puppet, postures, observed, view, tall, width)
-        _add_habits(postures, blocks, right)
+        habits.pull(postures, blocks, right)
         band = Band(blocks)
         moments.add(postures, band, right)
         postures = postures.turned(band.solve(right))
@@ -170,34 +152,6 @@ def _data_terms(
 
 def _cauchy(squares: np.ndarray, width: float) -> np.ndarray:
     return 1 / (1 + squares / width**2)
-
-
-def _add_habits(postures: Postures, blocks: Blocks, right: Float64[np.ndarray, "N P"]) -> None:
-    """Pull joints towards usual angles, and elbows and knees strongly into what they can do."""
-    count = len(postures)
-    still = np.tile(np.eye(3), (count, 1, 1))
-    both = np.tile(np.eye(3), (count, 2, 1, 1))
-    none, bends = np.zeros((count, 3)), np.zeros((count, 2))
-    zero = Postures(
-        postures.place, postures.pelvis, none, none, both, bends, both, both, bends, both
-    )
-    del still
-    away = postures.away_from(zero)
-    curvature = np.full((count, PARAMETERS), REST_STEP)
-    for name, part in LAYOUT.items():
-        kind = name.split(".")[0]
-        if kind not in USUAL:
-            continue
-        stiffness = 1 / USUAL[kind] ** 2
-        curvature[:, part] += stiffness
-        right[:, part] -= stiffness * away[:, part]
-        if kind in ("elbow", "knee"):
-            beyond = away[:, part] - np.clip(away[:, part], *BEND_LIMITS)
-            outside = (beyond != 0) / LIMIT_SIGMA**2
-            curvature[:, part] += outside
-            right[:, part] -= outside * beyond
-    diagonal = np.arange(PARAMETERS)
-    blocks[:, diagonal, diagonal] += curvature
 
 
 @dataclass(frozen=True)
