@@ -198,7 +198,7 @@ def _fit_shot(
         # a rest that is shorter than an overlap is fitted along
         if len(observed) - stop < OVERLAP:
             stop = len(observed)
-        window, count = fit_postures(puppet, observed[start:stop], view, frame_rate)
+        window, count = fit_postures(puppet, observed.at(slice(start, stop)), view, frame_rate)
         flipped += count
         postures = window if postures is None else _blended(postures, window, start)
         if stop == len(observed):

@@ -34,6 +34,7 @@ but wrong metres stay wrong for many frames, and the picture knows better what i
 CAUCHY = 1.5
 """Sigmas from which a landmark counts less and less."""
 
+LEAST_DEPTH = 0.1  # metres; nothing behind the camera is projected
 HIPS = [LANDMARK["left-hip"], LANDMARK["right-hip"]]
 
 
@@ -62,6 +63,7 @@ SUDDEN = 2.0
 
 VELOCITY_SHARE = 1 / 12
 """Of a change of speed's sigma over that of speed: keeps bodies where they were last seen."""
+
 
 @dataclass(frozen=True)
 class View:
@@ -100,11 +102,10 @@ def refine(
 ) -> Postures:
     """Take Gauss-Newton steps towards what was observed."""
     moments, habits = Moments.at(frame_rate), usual_habits()
-    tall = view.focal * puppet.body.height / np.median(postures.place[observed.seen, 1])
     for step in range(steps):
         # wide at first: far-off starts must not be taken for outliers
         width = CAUCHY * max(1.0, 8.0 / 2**step)
-        blocks, right = _data_terms(puppet, postures, observed, view, tall, width)
+        blocks, right = measure_misfit(puppet, postures, observed, view, width).equations()
         habits.pull(postures, blocks, right)
         band = Band(blocks)
         moments.add(postures, band, right)
@@ -112,42 +113,66 @@ def refine(
     return postures
 
 
-def _data_terms(
+@dataclass(frozen=True)
+class Misfit:
+    """How far a body is from what was observed, R numbers a frame, in sigmas or pixels.
+
+    Attributes:
+        away: The numbers.
+        weight: What each one's square counts.
+        slopes: How they change with each number of a step.
+    """
+
+    away: Float64[np.ndarray, "N R"]
+    weight: Float64[np.ndarray, "N R"]
+    slopes: Float64[np.ndarray, "N R P"]
+
+    def equations(self) -> tuple[Blocks, Float64[np.ndarray, "N P"]]:
+        """Make the normal equations of each frame alone."""
+        weighted = self.slopes * self.weight[..., None]
+        right = -np.einsum("nrp,nr->np", weighted, self.away)
+        return weighted.swapaxes(1, 2) @ self.slopes, right
+
+
+def measure_misfit(
     puppet: Puppet,
     postures: Postures,
     observed: Observed,
     view: View,
-    tall: float,
-    width: float,
-) -> tuple[Blocks, Float64[np.ndarray, "N P"]]:
+    width: float = CAUCHY,
+) -> Misfit:
+    """Compare a body with what was observed.
+
+    Args:
+        width: Sigmas from which a landmark counts less and less.
+    """
     placed = puppet.place(postures)
     points, slopes = placed.landmarks, placed.slopes()
     x, depth, z = np.moveaxis(points, -1, 0)
-    depth = np.maximum(depth, 0.1)
+    depth = np.maximum(depth, LEAST_DEPTH)
     scale = view.focal / depth
-    centre = np.array(view.centre)
-    away = np.stack([x * scale, -z * scale], -1) + centre - observed.image
-    # how the picture moves with a point: columns x, y (into it), z
+    away = np.stack([x * scale, -z * scale], -1) + np.array(view.centre) - observed.image
+    # how the picture moves with a point: to the right, into it, up
     u = scale[..., None] * (slopes[:, :, 0] - (x / depth)[..., None] * slopes[:, :, 1])
     v = scale[..., None] * (-slopes[:, :, 2] + (z / depth)[..., None] * slopes[:, :, 1])
-    sigma = IMAGE_SIGMA * tall
-    weight = observed.weight * _cauchy((away**2).sum(-1) / sigma**2, width) / sigma**2
-    rows = np.stack([u, v], 2)
-    residuals, weights = [away], [np.repeat(weight[..., None], 2, -1)]
-    slope_rows = [rows]
-    hips = points[:, HIPS].mean(1, keepdims=True)
-    apart = (points - hips - observed.world) / WORLD_SIGMA
+    sigma = IMAGE_SIGMA * _height_px(puppet, postures, observed, view)
+    image = observed.weight * _cauchy((away**2).sum(-1) / sigma**2, width) / sigma**2
+    apart = points - points[:, HIPS].mean(1, keepdims=True) - observed.world
+    apart = apart / WORLD_SIGMA
     slopes = (slopes - slopes[:, HIPS].mean(1, keepdims=True)) / WORLD_SIGMA[:, None]
-    weight = observed.weight * _cauchy((apart**2).sum(-1), width)
-    residuals.append(apart)
-    weights.append(np.repeat(weight[..., None], 3, -1))
-    slope_rows.append(slopes)
+    world = observed.weight * _cauchy((apart**2).sum(-1), width)
     count = len(postures)
-    j = np.concatenate(slope_rows, 2).reshape(count, -1, PARAMETERS)
-    w = np.concatenate(weights, 2).reshape(count, -1)
-    r = np.concatenate(residuals, 2).reshape(count, -1)
-    weighted = j * w[..., None]
-    return weighted.swapaxes(1, 2) @ j, -np.einsum("nrp,nr->np", weighted, r)
+    weights = [np.repeat(weight[..., None], n, -1) for weight, n in ((image, 2), (world, 3))]
+    return Misfit(
+        np.concatenate([away, apart], 2).reshape(count, -1),
+        np.concatenate(weights, 2).reshape(count, -1),
+        np.concatenate([np.stack([u, v], 2), slopes], 2).reshape(count, -1, PARAMETERS),
+    )
+
+
+def _height_px(puppet: Puppet, postures: Postures, observed: Observed, view: View) -> float:
+    depth = np.median(postures.place[observed.seen, 1])
+    return float(view.focal * puppet.body.height / max(depth, LEAST_DEPTH))
 
 
 def _cauchy(squares: np.ndarray, width: float) -> np.ndarray:

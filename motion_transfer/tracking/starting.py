@@ -46,7 +46,7 @@ class Observed:
     def __len__(self) -> int:
         return len(self.image)
 
-    def __getitem__(self, frames: slice) -> Observed:
+    def at(self, frames: slice | np.ndarray) -> Observed:
         """Take some of the frames."""
         return Observed(self.image[frames], self.world[frames], self.weight[frames])
 
