@@ -88,8 +88,8 @@ _NAMES_OF = {
     "free.binding": "HELPERS_FIRST_USE are_helpers_cached load_helpers",
     "free.person": "FreePerson",
     "motion.bvh.writing": "write_bvh",
-    "motion.limbs": "ARM_AT_ZERO LEG_AT_ZERO NECK SPINE Bones Rest arm_bones finger_bones leg_bones mirrored_matrix"
-    " rotation turned whole_body",
+    "motion.limbs": "ARM_AT_ZERO LEG_AT_ZERO NECK SPINE Bones Rest arm_bones finger_bones leg_bones"
+    " mirrored_matrix rotation turned whole_body",
     "motion.pose_sampler": "sample_pose",
     "motion.poses": "Arm Leg Pose arm_chain leg_chain",
     "person": "DressedPerson Person sample_person",

@@ -8,7 +8,7 @@ so do sudden movements if the picture insists on them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
@@ -155,7 +155,7 @@ def measure_misfit(
     # how the picture moves with a point: to the right, into it, up
     u = scale[..., None] * (slopes[:, :, 0] - (x / depth)[..., None] * slopes[:, :, 1])
     v = scale[..., None] * (-slopes[:, :, 2] + (z / depth)[..., None] * slopes[:, :, 1])
-    sigma = IMAGE_SIGMA * _height_px(puppet, postures, observed, view)
+    sigma = IMAGE_SIGMA * _height_px(puppet, postures, view)
     image = observed.weight * _cauchy((away**2).sum(-1) / sigma**2, width) / sigma**2
     apart = points - points[:, HIPS].mean(1, keepdims=True) - observed.world
     apart = apart / WORLD_SIGMA
@@ -170,8 +170,8 @@ def measure_misfit(
     )
 
 
-def _height_px(puppet: Puppet, postures: Postures, observed: Observed, view: View) -> float:
-    depth = np.median(postures.place[observed.seen, 1])
+def _height_px(puppet: Puppet, postures: Postures, view: View) -> float:
+    depth = np.median(postures.place[:, 1])
     return float(view.focal * puppet.body.height / max(depth, LEAST_DEPTH))
 
 

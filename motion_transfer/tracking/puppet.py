@@ -11,7 +11,7 @@ turned by a rotation vector in the axes of what carries them.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float64
@@ -39,6 +39,7 @@ Matrices = Float64[np.ndarray, "N 3 3"]
 Sides = Float64[np.ndarray, "N 2 3 3"]
 
 RELAXED = 0.3  # curl of the fingers; landmarks do not say it
+HEAD = ("nose", "eye-inner", "eye-middle", "eye-outer", "ear", "mouth")
 HANDS = ("pinky", "index", "thumb")
 ARM_DOWN = np.array([0.0, 0.0, -1.0])
 MIRROR = np.array([-1.0, 1.0, 1.0])
@@ -320,7 +321,7 @@ class Puppet:
 
     def _collar(self, chain: Matrices, i: int) -> Matrices:
         """Let the collar bones follow the upper arms, see `collar_bone`."""
-        across, ahead, up = np.moveaxis(chain @ ARM_DOWN, -1, 0)
+        _, ahead, up = np.moveaxis(chain @ ARM_DOWN, -1, 0)
         lift = 0.55 * (0.5 * (1 + up)).clip(0) ** 1.5
         angles = np.stack([np.zeros_like(lift), -lift, 0.22 * ahead], -1)
         matrices = Rotation.from_euler("XYZ", angles).as_matrix()
@@ -363,12 +364,9 @@ class Puppet:
 
 def _groups() -> dict[str, list[int]]:
     """Sort the landmarks by what they move with."""
-    segments = {
-        **dict.fromkeys(("nose", "eye-inner", "eye-middle", "eye-outer", "ear", "mouth"), "head"),
-        **{"shoulder": "collar", "elbow": "upper", "wrist": "fore"},
-        **dict.fromkeys(HANDS, "hand"),
-        **{"hip": "hip", "knee": "thigh", "ankle": "shin", "heel": "foot", "foot-index": "foot"},
-    }
+    segments = dict.fromkeys(HEAD, "head") | dict.fromkeys(HANDS, "hand")
+    segments |= {"shoulder": "collar", "elbow": "upper", "wrist": "fore", "hip": "hip"}
+    segments |= {"knee": "thigh", "ankle": "shin", "heel": "foot", "foot-index": "foot"}
     groups: dict[str, list[int]] = {}
     for index, name in enumerate(LANDMARK_NAMES):
         kind, side = anchor_of(name)
@@ -408,7 +406,7 @@ def _bent(
     """Spread a bend over bones: the last one's rotation and place, and the middle of all."""
     each = turns(bend / len(bones))
     matrices, places = carrier @ each, [place]
-    for near, far in zip(bones, bones[1:], strict=False):
+    for near, far in pairwise(bones):
         places.append(places[-1] + _applied(matrices, puppet.joint(far) - puppet.joint(near)))
         matrices = matrices @ each
     return matrices, places[-1], np.mean(places, axis=0)

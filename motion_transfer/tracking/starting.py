@@ -7,6 +7,7 @@ person does not turn about within a frame, so such frames are found and their na
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float64
@@ -18,6 +19,9 @@ from motion_transfer.tracking.puppet import GROUPS, Matrices, Postures, Puppet, 
 
 TURN_DEGREES = 20.0
 """How far a quick dancer turns within a frame of a thirtieth of a second."""
+
+EXCHANGED = np.array([0.0, 1.0])
+"""What a frame costs: as BlazePose reads it, and with names exchanged."""
 
 MOST_COST = 40.0
 """Of a turn from one frame to the next, in frames with exchanged names: a turn about that lasts
@@ -53,7 +57,7 @@ class Observed:
     @property
     def seen(self) -> Bool[np.ndarray, " N"]:
         """Which frames show somebody."""
-        return self.weight.any(1)
+        return (self.weight > 0).any(axis=1)
 
 
 LEAST_WEIGHT = 0.05
@@ -103,7 +107,7 @@ def find_flipped(observed: Observed, frame_rate: float) -> Bool[np.ndarray, " N"
             total = cost[:, None] + np.minimum((away / width) ** 2, MOST_COST)
             came_from[frame] = total.argmin(0)
             cost = total.min(0)
-        cost = cost + [0.0, 1.0]
+        cost = cost + EXCHANGED
     flipped = np.zeros(len(observed), bool)
     state = int(cost.argmin())
     for frame in reversed(range(len(observed))):
@@ -125,10 +129,10 @@ def unflipped(observed: Observed, flipped: Bool[np.ndarray, " N"]) -> Observed:
 
 def _facing(world: Float64[np.ndarray, "N 33 3"]) -> Float64[np.ndarray, " N"]:
     """Tell which way the left hand points, radians about the vertical."""
-    across = sum(
-        world[:, LANDMARK[f"left-{name}"]] - world[:, LANDMARK[f"right-{name}"]]
-        for name in ("shoulder", "hip")
+    left, right = (
+        [LANDMARK[f"{side}-{name}"] for name in ("shoulder", "hip")] for side in ("left", "right")
     )
+    across = (world[:, left] - world[:, right]).sum(1)
     return np.arctan2(across[:, 1], across[:, 0])
 
 
@@ -192,7 +196,7 @@ def _places(
         for points, mean in ((model, middle), (observed.image, seen))
     )
     depth = focal * spread / np.maximum(tall, 1e-6)
-    known = observed.seen
+    known = observed.seen | ~observed.seen.any()  # a window may lie between two sights
     depth = np.where(known, depth, np.median(depth[known]))
     across = (seen - centre) * depth[:, None] / focal - middle
     return np.stack([across[:, 0], depth, -across[:, 1]], 1)
@@ -212,8 +216,7 @@ def _limb(
 ) -> tuple[Matrices, Float64[np.ndarray, " N"]]:
     """Find a limb's chain from where its parts point; its hinge, where it is bent."""
     near, far = (
-        _unit(np.einsum("nji,nj->ni", carrier, end - begin))
-        for begin, end in zip(places, places[1:], strict=False)
+        _unit(np.einsum("nji,nj->ni", carrier, end - begin)) for begin, end in pairwise(places)
     )
     swing = _shortest(zero[:, 0], near)
     hinge = np.cross(near, far)
