@@ -26,7 +26,7 @@ COMMANDS = {
     "adapt": "Let the network learn one person from their own photos.",
     "demo": "Render a photo and a driver that ship with the program.",
     "train": "Train the network, or fine-tune it on one person.",
-    "people": "Synthetic people: photos with exact IUV, and drivers from motion.",
+    "people": "Synthetic people: photos with exact IUV; drivers from motion, motion from clips.",
     "models": "The networks that find people in raw pictures: fetch them.",
     "eval": "Score renderers, and other methods' pictures, on the same pairs.",
     "calibrate": "Let a checkpoint's network be computed in 8 bits, twice as fast.",

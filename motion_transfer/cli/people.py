@@ -1,4 +1,4 @@
-"""`mt people`: drivers from motion, and photos of synthetic people."""
+"""`mt people`: motion from clips, drivers from motion, and photos of synthetic people."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import click
 
 from motion_transfer.cli.options import FILE, SectionCommand, section
 from motion_transfer.cli.progress import CountBar, long_wait
+from motion_transfer.cli.terminal import note, tell
 from motion_transfer.option import parse_rate, parse_size
 
 SHARE = click.FloatRange(0, 1)
 BODY_OPTIONS = ("gender", "age", "height", "weight", "muscle", "proportions")
 
+input_option = section("Input")
 motion_option = section("Motion")
 body_option = section("Body")
 camera_option = section("Camera")
@@ -24,10 +26,11 @@ output_option = section("Output")
 
 @click.group()
 def people() -> None:
-    """Synthetic people: photos with exact IUV, and drivers from motion.
+    """Synthetic people: photos with exact IUV, drivers from motion, and motion from clips.
 
     \b
     mt people drive walk -o walk.mkv
+    mt people track dance.mp4 -o dance.bvh
     mt run --source photo.png --driver people:dance -o out.mp4
     mt people render --count 100 --out people/
     """
@@ -95,6 +98,46 @@ def drive(
     if not quiet:
         seconds = float(driver.frame_count / driver.frame_rate)
         click.echo(f"{output}: {driver.frame_count} frames, {seconds:.2f} s of {motion}")
+
+
+@people.command(cls=SectionCommand)
+@click.argument("source", metavar="VIDEO|DIR|PHOTO", type=FILE)
+@input_option(
+    "--person",
+    default="largest",
+    metavar="WHO",
+    help="largest (default), an index from the left (0 first), or a box x0,y0,x1,y1.",
+)
+@output_option("-o", "--output", type=FILE, required=True, help="A .bvh file.")
+@output_option("--force", is_flag=True, help="Replace an existing output.")
+@output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+def track(source: Path, quiet: bool, **options: Any) -> None:
+    """Fit a body to a person of a clip, and write its motion.
+
+    BlazePose finds the person's landmarks (`mt models fetch`, once); a body is fitted to those of
+    all frames at once. The motion is BVH, in metres, y up, with the body's proportions: a driver
+    from any side, or for other programs.
+
+    \b
+    mt people track dance.mp4 -o dance.bvh
+    mt run --source me.jpg --driver people:dance.bvh,azimuth=45 -o out.mp4
+    """
+    from motion_transfer.render.plan import list_stretches
+    from motion_transfer.tracking import TrackOptions, track_motion
+
+    settings = TrackOptions(source=source, **options)
+    prepare_body_model(quiet)
+    with CountBar("finding the person", unit="frame", quiet=quiet) as bar:
+        found = track_motion(settings, bar.advance)
+    if quiet:
+        return
+    if unseen := found.unseen:
+        count = sum(stop - start for start, stop in unseen)
+        times = list_stretches(unseen, 0, found.frame_rate)
+        note(f"nobody found in {count} frames, which are filled in: {times}")
+    seconds = float(len(found) / found.frame_rate)
+    shots = f", {len(found.shots)} shots" if len(found.shots) > 1 else ""
+    tell(f"wrote {settings.output}: {len(found)} frames, {seconds:.2f} s{shots}")
 
 
 @people.command(cls=SectionCommand)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         load_body_model,
     )
     from motion_transfer.people.figure.camera import Camera
+    from motion_transfer.people.figure.charts import load_charts, render_iuv
     from motion_transfer.people.figure.mesh import PosedBody
     from motion_transfer.people.figure.rasterise import Triangles, depths, rasterise
     from motion_transfer.people.free.assets import check_share, find_assets, load_assets
@@ -40,17 +41,38 @@ if TYPE_CHECKING:
         load_helpers,
     )
     from motion_transfer.people.free.person import FreePerson
+    from motion_transfer.people.motion.bvh.writing import write_bvh
+    from motion_transfer.people.motion.limbs import (
+        ARM_AT_ZERO,
+        LEG_AT_ZERO,
+        NECK,
+        SPINE,
+        Bones,
+        Rest,
+        arm_bones,
+        finger_bones,
+        leg_bones,
+        mirrored_matrix,
+        rotation,
+        turned,
+        whole_body,
+    )
+    from motion_transfer.people.motion.pose_sampler import sample_pose
+    from motion_transfer.people.motion.poses import Arm, Leg, Pose, arm_chain, leg_chain
     from motion_transfer.people.person import DressedPerson, Person, sample_person
     from motion_transfer.people.photo import PersonPhoto, Shot, sample_shot
     from motion_transfer.people.picture.iuv_noise import IuvNoise
 
 __all__ = [
-    "FIRST_USE", "HELPERS_FIRST_USE", "SCHEME", "AlbumOptions", "Body", "BodyModel", "Camera",
-    "DressedPerson", "FreePerson", "IuvNoise", "MotionDriver", "MotionOptions", "PeopleDataset",
-    "PeopleStream", "Person", "PersonPhoto", "PosedBody", "Shape", "Shot", "Split", "Triangles",
-    "are_helpers_cached", "check_motion", "check_share", "depths", "find_assets", "is_cached",
-    "is_motion", "load_assets", "load_body_model", "load_helpers", "open_motion", "rasterise",
-    "record_motion", "sample_person", "sample_shot", "write_album",
+    "ARM_AT_ZERO", "FIRST_USE", "HELPERS_FIRST_USE", "LEG_AT_ZERO", "NECK", "SCHEME", "SPINE",
+    "AlbumOptions", "Arm", "Body", "BodyModel", "Bones", "Camera", "DressedPerson", "FreePerson",
+    "IuvNoise", "Leg", "MotionDriver", "MotionOptions", "PeopleDataset", "PeopleStream", "Person",
+    "PersonPhoto", "Pose", "PosedBody", "Rest", "Shape", "Shot", "Split", "Triangles",
+    "are_helpers_cached", "arm_bones", "arm_chain", "check_motion", "check_share", "depths",
+    "find_assets", "finger_bones", "is_cached", "is_motion", "leg_bones", "leg_chain",
+    "load_assets", "load_body_model", "load_charts", "load_helpers", "mirrored_matrix",
+    "open_motion", "rasterise", "record_motion", "render_iuv", "rotation", "sample_person",
+    "sample_pose", "sample_shot", "turned", "whole_body", "write_album", "write_bvh",
 ]  # fmt: skip
 
 _NAMES_OF = {
@@ -59,11 +81,17 @@ _NAMES_OF = {
     "driver": "MotionDriver MotionOptions check_motion open_motion record_motion",
     "figure.body": "FIRST_USE Body BodyModel Shape is_cached load_body_model",
     "figure.camera": "Camera",
+    "figure.charts": "load_charts render_iuv",
     "figure.mesh": "PosedBody",
     "figure.rasterise": "Triangles depths rasterise",
     "free.assets": "check_share find_assets load_assets",
     "free.binding": "HELPERS_FIRST_USE are_helpers_cached load_helpers",
     "free.person": "FreePerson",
+    "motion.bvh.writing": "write_bvh",
+    "motion.limbs": "ARM_AT_ZERO LEG_AT_ZERO NECK SPINE Bones Rest arm_bones finger_bones leg_bones"
+    " mirrored_matrix rotation turned whole_body",
+    "motion.pose_sampler": "sample_pose",
+    "motion.poses": "Arm Leg Pose arm_chain leg_chain",
     "person": "DressedPerson Person sample_person",
     "photo": "PersonPhoto Shot sample_shot",
     "picture.iuv_noise": "IuvNoise",

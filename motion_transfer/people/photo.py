@@ -100,27 +100,30 @@ def take_photo(
     shot: Shot,
     size: tuple[int, int],
     noise: IuvNoise | None = None,
+    camera: Camera | None = None,
 ) -> PersonPhoto:
     """Take a shot of a dressed person.
 
     Args:
         size: (width, height) of the photo in px.
         noise: Faults of DensePose to put into the IUV; None: exact.
+        camera: One that stays where it is, for frames of a clip; None: as the shot says.
     """
     rng = np.random.default_rng(shot.seed)
     posed = dressed.posed(shot.pose)
     points = np.concatenate([piece.posed(posed) for piece in dressed.pieces])
-    lowest = lowest_in(posed.joints, dressed.model.skeleton, shot.framing)
-    outline = points[::FRAMED_STEP]
-    camera = frame_points(
-        outline[outline[:, 2] >= lowest],
-        size,
-        distance=shot.distance,
-        elevation=shot.elevation,
-        roll=shot.roll,
-        margin=shot.margin,
-        shift=shot.shift,
-    )
+    if camera is None:
+        lowest = lowest_in(posed.joints, dressed.model.skeleton, shot.framing)
+        outline = points[::FRAMED_STEP]
+        camera = frame_points(
+            outline[outline[:, 2] >= lowest],
+            size,
+            distance=shot.distance,
+            elevation=shot.elevation,
+            roll=shot.roll,
+            margin=shot.margin,
+            shift=shot.shift,
+        )
     seen = dressed.scene.shade(points, camera, shot.light)
     alpha = np.rint(seen.coverage * 255).astype(np.uint8)
     # a camera in the floor would see no floor

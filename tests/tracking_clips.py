@@ -1,0 +1,28 @@
+"""Clips of a body in motion whose landmarks are known exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motion_transfer.estimate.interface import Landmarks
+from motion_transfer.people.figure.body import load_body_model
+from motion_transfer.people.figure.camera import Camera
+from motion_transfer.people.figure.mesh import PosedBody
+from motion_transfer.people.motion.motions import MOTIONS
+from motion_transfer.people.motion.poses import Pose, posed
+from motion_transfer.tracking.landmarks import exact_landmarks
+
+FOCAL = 614.4
+CAMERA = Camera(512, 512, FOCAL, 3.2, (0.0, 0.0, 0.9))
+
+
+def clip(name: str, count: int = 60) -> tuple[list[Pose], list[PosedBody], list[Landmarks | None]]:
+    """A motion's poses, bodies and exact landmarks, at 30 frames a second."""
+    model, motion = load_body_model(), MOTIONS[name]
+    poses = [motion.pose(frame / (30 * motion.seconds)) for frame in range(count)]
+    bodies = [posed(model.template, pose, model) for pose in poses]
+    marks = [exact_landmarks(body, model, CAMERA) for body in bodies]
+    # BlazePose's metres are short, see TO_WORLD
+    short = np.array([1 / 1.09, 1 / 1.09, 1 / 0.93], np.float32)
+    seen = [Landmarks(m.image, m.world * short, m.visibility, m.presence) for m in marks]
+    return poses, bodies, list(seen)
