@@ -59,8 +59,7 @@ class HandSurface:
         arm = turn
         if forearm is not None:
             arm = turn_between(turn @ -self.elbow, forearm) @ turn
-        wrist = moved[PALM, :, 3]
-        moved[FOREARM] = _matrix(scale * arm, self.joints[0], wrist)
+        moved[FOREARM] = _matrix(scale * arm, np.zeros(3), middle)  # about the wrist's joint
         for finger in range(5):
             above = turn
             for joint in range(3):
