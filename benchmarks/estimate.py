@@ -2,6 +2,7 @@
 
     MT_SAMPLES=folder .venv/bin/python benchmarks/estimate.py photos [--pictures OUT]
     .venv/bin/python benchmarks/estimate.py clips [--people 8]
+    .venv/bin/python benchmarks/estimate.py hands [--people 20]
     .venv/bin/python benchmarks/estimate.py speed [--against CHECKOUT] [--size 854x480]
 
 `photos`: the folder holds real photos with DensePose's own IUV, `deepfashion/*.png` with
@@ -11,6 +12,10 @@ person is taken.
 `clips`: held-out people who stand still, seen by a camera with noise and a flickering exposure: how
 many of the body's pixels change their part from one frame to the next. And people who turn once
 around themselves: in how many frames left and right, or front and back, are exchanged.
+
+`hands`: large photos of held-out people: around each true hand, how many pixels have the right part
+(background and body included), and how well the hand itself is covered, with hands that are looked
+at once more and without.
 
 `speed`: a clip of the demo's person, who goes to and fro, in H.264. Whole runs, decode to encode,
 in turns with those of another checkout of this project; then what each step takes alone.
@@ -38,7 +43,8 @@ import cv2
 import numpy as np
 
 from motion_transfer.cores import core_count
-from motion_transfer.estimate.blazepose import BlazePoseEstimator
+from motion_transfer.estimate.blazepose import BlazePoseEstimator, details
+from motion_transfer.estimate.blazepose.hands import find_hands
 from motion_transfer.estimate.clip import lay_iuv
 from motion_transfer.estimate.interface import AT_ONCE, PersonEstimate
 from motion_transfer.estimate.shots import mark_shots
@@ -54,7 +60,8 @@ MAN = (slice(170, 460), slice(170, 290))
 
 GOALS = IuvScore(iou=0.87, part_agreement=0.86, uv_error=0.06, swapped=0.0, turned=0.0)
 STEP_FRAMES = 60
-CLIP_SIZE = (384, 384)
+CLIP_SIZE, HANDS_SIZE = (384, 384), (768, 768)
+LEAST_HAND = 24  # px
 EXCHANGED = 0.4  # of a body or a trunk: more than borders
 
 RUN = r"""
@@ -83,6 +90,10 @@ def main() -> None:
     clips.add_argument("--frames", type=int, default=60)
     clips.add_argument("--weights", type=Path)
     clips.set_defaults(do=score_clips)
+    hands = ways.add_parser("hands")
+    hands.add_argument("--people", type=int, default=20)
+    hands.add_argument("--pictures", type=Path, help="write photo, exact, coarse and fine IUV here")
+    hands.set_defaults(do=score_hands)
     speed = ways.add_parser("speed")
     speed.add_argument("--against", type=Path, metavar="CHECKOUT")
     speed.add_argument("--clip", type=Path, help="instead of the demo's person")
@@ -162,6 +173,45 @@ def score_clips(options: argparse.Namespace) -> None:
     for name in ("swapped", "turned"):
         frames = sum(getattr(one, name) > EXCHANGED for one in turning)
         print(f"turning: {name} in {frames} of {len(turning)} frames")
+
+
+def score_hands(options: argparse.Namespace) -> None:
+    """Print how right hands are, drawn and only painted."""
+    people = PeopleStream(split="held-out", size=HANDS_SIZE)
+    estimator = BlazePoseEstimator(most_people=1)
+    rows, changed = [], 0
+    for number in range(options.people):
+        dressed = people.dress(number)
+        for view in range(2):
+            photo = people.take(dressed, people.shot(number, view))
+            pair = []
+            for find in (lambda _frame, _landmarks: {}, find_hands):
+                details.find_hands = find
+                estimator.start_shot()
+                pair.append(lay_iuv(estimator.estimate(photo.rgb), *photo.rgb.shape[:2])[..., 0])
+            for part in (3, 4):
+                x, y, width, height = cv2.boundingRect((photo.iuv[..., 0] == part).view(np.uint8))
+                if max(width, height) < LEAST_HAND:
+                    continue
+                rim = max(width, height) // 4
+                place = np.s_[max(0, y - rim) : y + height + rim, max(0, x - rim) : x + width + rim]
+                true = photo.iuv[place][..., 0]
+                found = [each[place] for each in pair]
+                changed += bool((found[0] != found[1]).any())
+                hands = [(each == part, true == part) for each in found]
+                rows.append(
+                    [float((each == true).mean()) for each in found]
+                    + [float((a & b).sum() / (a | b).sum()) for a, b in hands]
+                )
+                if options.pictures:
+                    options.pictures.mkdir(parents=True, exist_ok=True)
+                    shown = [np.repeat(each[..., None] * 10, 3, 2) for each in (true, *found)]
+                    picture = np.hstack([photo.rgb[place][..., ::-1], *shown])
+                    cv2.imwrite(str(options.pictures / f"{number}-{view}-{part}.png"), picture)
+    painted, drawn, coarse, fine = np.mean(rows, 0)
+    print(f"{len(rows)} hands of {LEAST_HAND} px and more; {changed} of them drawn")
+    print(f"parts right around them: painted {painted:.3f}, drawn {drawn:.3f}")
+    print(f"intersection over union: painted {coarse:.3f}, drawn {fine:.3f}")
 
 
 def with_noise(photo: np.ndarray, rng: np.random.Generator) -> np.ndarray:
