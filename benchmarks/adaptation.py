@@ -20,7 +20,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from motion_transfer.drawing.canvas import Canvas, make_background
+from motion_transfer.drawing.backgrounds import make_background
+from motion_transfer.drawing.canvas import draw_over
 from motion_transfer.drawing.engines import Execution
 from motion_transfer.drawing.engines.torch_engine import TorchEngine
 from motion_transfer.drawing.person import bounding_box
@@ -125,8 +126,8 @@ def score(
     for target in targets:
         size = target.iuv.shape[0], target.iuv.shape[1]
         background = make_background("white", size, source, in_place=False)
-        canvas = Canvas(background, crop=False, comparison=None)
-        drawn = canvas.draw(renderer, target.iuv, plan_window([bounding_box(target.iuv)]))
+        window = plan_window([bounding_box(target.iuv)])
+        drawn = draw_over(background, renderer, target.iuv, window)
         real = framing.fit_target(target)
         seen = np.zeros(real.mask.shape, bool)
         for picture in sources:

@@ -159,7 +159,8 @@ def overhead(folder: Path, sizes: Sizes) -> None:
     with WorkFolder(options.output) as work:
         composed = prepare(options, work, ignore)
     prepared = composed.prepared
-    renderer, reader = prepared.recipe.renderer(composed.appearance), prepared.driver.open()
+    renderer = prepared.recipe.renderer(composed.appearances[0])
+    [reader] = prepared.open_people()
     window = prepared.plan.shots[0].window
     side = renderer.working_size(window.side)
     iuv = reader.read(0, renderer.batch_size(side))
@@ -178,7 +179,9 @@ def overhead(folder: Path, sizes: Sizes) -> None:
 
     def engine() -> None:
         chunks = [(c, Path(temporary) / f"{c.index}.nut") for c in prepared.plan.chunks]
-        whole = Engine(prepared, reader=reader, renderer=renderer)
+        whole = Engine(
+            prepared, readers=[reader], renderers=[renderer], backdrop=prepared.backdrop.open()
+        )
         whole.render(chunks, cores, lambda _chunk, _path: None)
 
     seconds: dict[Callable[[], None], list[float]] = {in_turn: [], side_by_side: [], engine: []}

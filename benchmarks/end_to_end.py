@@ -153,10 +153,10 @@ def time_network(driver: Path, folder: Path, weights: Path, precision: str) -> t
     )
     composed = compose(options, folder, ignore)
     plan = composed.prepared.plan
-    renderer = composed.prepared.recipe.renderer(composed.appearance)
+    renderer = composed.prepared.recipe.renderer(composed.appearances[0])
     window = plan.shots[0].window
     size = renderer.working_size(window.side)
-    frames = composed.prepared.driver.open().read(0, len(plan.frames))
+    frames = composed.prepared.open_people()[0].read(0, len(plan.frames))
     crops = np.stack([window.cut(iuv, size) for iuv in frames])
     step = renderer.batch_size(size)
     crops = np.concatenate([crops, crops[: -len(crops) % step]])  # whole batches, as in a run

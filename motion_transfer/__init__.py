@@ -13,12 +13,13 @@ from motion_transfer.version import __version__
 if TYPE_CHECKING:
     from motion_transfer.api import render_video
     from motion_transfer.errors import MotionTransferError
-    from motion_transfer.render.options import Garment, RenderOptions
+    from motion_transfer.render.options import Garment, Partner, RenderOptions
     from motion_transfer.render.run import RenderReport
 
 __all__ = [
     "Garment",
     "MotionTransferError",
+    "Partner",
     "RenderOptions",
     "RenderReport",
     "__version__",
@@ -27,6 +28,7 @@ __all__ = [
 
 _HOMES = {
     "Garment": "motion_transfer.render.options",
+    "Partner": "motion_transfer.render.options",
     "MotionTransferError": "motion_transfer.errors",
     "RenderOptions": "motion_transfer.render.options",
     "RenderReport": "motion_transfer.render.run",

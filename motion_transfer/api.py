@@ -11,7 +11,7 @@ from typing import Literal
 from motion_transfer.events import Listener, ignore
 from motion_transfer.media.iuv.formats import ChannelOrder, DriverKind, Missing
 from motion_transfer.option import parse_frames, parse_rate
-from motion_transfer.render.options import Garment, RenderOptions
+from motion_transfer.render.options import Garment, Partner, RenderOptions
 from motion_transfer.render.run import RenderReport, run
 
 AnyPath = str | PathLike[str]
@@ -37,7 +37,15 @@ def render_video(
     fit_body: bool = False,
     renderer: str = "nhrr",
     weights: AnyPath | None = None,
-    background: str = "white",
+    background: str | PathLike[str] = "white",
+    background_fit: Literal["cover", "contain", "stretch"] = "cover",
+    background_end: Literal["loop", "hold", "cut"] = "loop",
+    background_blur: float = 0.0,
+    place: str | None = None,
+    on_the_spot: bool = False,
+    shadow: bool = False,
+    match_colours: bool = False,
+    partners: Sequence[Partner] = (),
     workers: int | None = None,
     adapt: bool = False,
     engine: str | None = None,
@@ -46,9 +54,11 @@ def render_video(
     frame_rate: str | float | Fraction | None = None,
     codec: str | None = None,
     crf: int | None = None,
+    pix_fmt: str | None = None,
+    alpha: Literal["straight", "premultiplied"] = "straight",
     audio: AnyPath | None = None,
     audio_track: int | None = None,
-    size: Literal["driver", "crop", "even"] = "driver",
+    size: Literal["driver", "crop", "even", "background"] = "driver",
     compare: bool = False,
     sheet: AnyPath | None = None,
     force: bool = False,
@@ -63,7 +73,8 @@ def render_video(
         driver: A video, a photo or a folder of photos of a person; or a folder of IUV images, an
             IUV image, a lossless IUV video, `.npy`, `.npz`, a detectron2 dump; or a motion such as
             `people:walk`.
-        output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.png` (one frame), or a folder of PNG.
+        output: `.mp4`, `.mov`, `.mkv`, `.webm`, `.gif`, `.webp`, `.apng`, `.png` (one frame), or a
+            folder of PNG.
         source_iuv: The IUV of each source; else it is looked for beside it, and estimated where
             there is none.
         person: `largest`, an index from the left (0 first), or a box `x0,y0,x1,y1` in px.
@@ -80,7 +91,17 @@ def render_video(
         fit_body: Give the driver's body the proportions of the source's.
         renderer: `nhrr` (the network) or `texture` (a draft without it).
         weights: Checkpoint of the network; else the one that ships.
-        background: `white`, `black`, `#rrggbb` or `photo`.
+        background: `white`, `black`, `#rrggbb`, `transparent`, a picture or a video; `photo` (the
+            source's, without its person) or `driver` (the driver's pictures, likewise).
+        background_fit: How a picture behind fills the frame.
+        background_end: What a video behind does at its end; `cut` ends the output there.
+        background_blur: In percent of the frame's height.
+        place: `X,Y,SCALE`: where the feet stand at first, in shares of the frame, and how much
+            larger the person is than in the driver.
+        on_the_spot: Keep the person where it stands at first.
+        shadow: Lay a soft shadow under the feet.
+        match_colours: Bring the person's light half-way to the background's.
+        partners: Who takes the place of others in the driver.
         workers: Threads; else one for each core.
         adapt: Let the network learn the source's person first, some minutes; later runs find it
             done.
@@ -88,10 +109,12 @@ def render_video(
         precision: What it is computed in, `int8`, `bf16` or `f32`; else the fastest here.
         device: `cpu`, `cuda`, or `cuda:1`; else `cuda` where it is.
         frame_rate: Frames per second, exact if given as a string or Fraction.
-        codec, crf: Of a video; else by container and codec.
+        codec, crf, pix_fmt: Of a video; else by container and codec.
+        alpha: How transparent colours are written.
         audio: File whose sound is laid under, or `"none"`; else the driver's own, if it has any.
         audio_track: Which of the sound's tracks, 0 first; else the one that is marked as default.
-        size: The driver's frame, the square around the person, or the frame made even.
+        size: The driver's frame, the square around the person, the frame made even, or that of a
+            picture or video behind.
         compare: Show source, IUV and result side by side.
         sheet: Where to write a contact sheet (PNG) as well.
         force: Replace an existing output.
@@ -122,7 +145,15 @@ def render_video(
             fit_body=fit_body,
             renderer=renderer,
             weights=_path(weights),
-            background=background,
+            background=str(background),
+            background_fit=background_fit,
+            background_end=background_end,
+            background_blur=background_blur,
+            place=place,
+            on_the_spot=on_the_spot,
+            shadow=shadow,
+            match_colours=match_colours,
+            partners=tuple(partners),
             workers=workers,
             adapt=adapt,
             engine=engine,
@@ -132,6 +163,8 @@ def render_video(
             frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
             codec=codec,
             crf=crf,
+            pix_fmt=pix_fmt,
+            alpha=alpha,
             audio=_path(audio),
             audio_track=audio_track,
             size=size,

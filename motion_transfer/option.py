@@ -9,6 +9,7 @@ that help is instant.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -31,6 +32,8 @@ Kind = Literal[
     "flag",
     "switch",
     "garments",
+    "partners",
+    "background",
 ]
 Options = TypeVar("Options")
 
@@ -76,7 +79,7 @@ class Option:
     @property
     def word(self) -> str:
         """The option's name in a manifest, such as `source_iuv`."""
-        if self.kind == "garments":
+        if self.kind in ("garments", "partners"):
             return self.name
         long = next(flag for flag in self.flags if flag.startswith("--"))
         return long.split("/")[0].removeprefix("--").replace("-", "_")
@@ -165,20 +168,46 @@ def check_choices(options: Any) -> None:
             raise InputError(f"{entry.name} is {value!r}; supported are {listed}")
 
 
+COLOURS = {"white": "#ffffff", "black": "#000000"}
+SCENES = ("photo", "driver", "transparent")
+"""Backgrounds that are words, and no colour."""
+
+
 def parse_colour(text: str) -> tuple[int, int, int] | None:
     """Read the RGB of `white`, `black` or `#rrggbb`; None for `photo`. Raises: InputError."""
-    named = {"white": "#ffffff", "black": "#000000"}
-    code = named.get(text, text)
-    if code == "photo":
+    if text == "photo":
         return None
     try:
-        if len(code) != 7 or code[0] != "#":
-            raise ValueError
-        red, green, blue = bytes.fromhex(code[1:])
+        return _read_colour(text)
     except ValueError:
         raise InputError(
             f"background {text!r}; supported are white, black, photo and #rrggbb"
         ) from None
+
+
+def parse_background(text: str) -> tuple[int, int, int] | str | Path:
+    """Read a background: the RGB of a colour, a word of `SCENES`, or else a file.
+
+    Raises: InputError for a colour that is none.
+    """
+    if text in SCENES:
+        return text
+    try:
+        return _read_colour(text)
+    except ValueError:
+        if text.startswith("#") or not text:
+            raise InputError(
+                f"background {text[:LONGEST_SHOWN]!r}; write a colour as #rrggbb, white, black,"
+                f" {', '.join(SCENES)}, or name a picture or a video"
+            ) from None
+    return Path(text)
+
+
+def _read_colour(text: str) -> tuple[int, int, int]:
+    code = COLOURS.get(text, text)
+    if len(code) != 7 or code[0] != "#":
+        raise ValueError(text)
+    red, green, blue = bytes.fromhex(code[1:])
     return red, green, blue
 
 
@@ -237,6 +266,17 @@ def parse_size(text: str) -> tuple[int, int]:
     return size
 
 
+def parse_number(written: str | float) -> float:
+    """Read a number. Raises: InputError."""
+    try:
+        number = float(written)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{str(written)[:LONGEST_SHOWN]!r} is no number; write one, such as 1.5")
+    return number
+
+
 def read_whole(text: str) -> int:
     """Read a whole number as people write one: up to nine of our digits, and a sign.
 
@@ -271,6 +311,7 @@ PARSERS: dict[str, Callable[[Any], Any]] = {
     "path": Path,
     "paths": _paths,
     "words": tuple,
+    "number": parse_number,
     "rate": parse_rate,
     "frames": parse_frames,
 }

@@ -19,19 +19,22 @@ Stage = Literal["begun", "preparing", "rendering", "assembling", "ended"]
 
 def scan_name(options: RenderOptions) -> str:
     """Name what is seen of a driver; jobs of one name share it."""
+    partners = tuple(partner.person for partner in options.partners)
     # a driver that is fitted to a source belongs to that source as well
-    fitted = part_of(options, SourceOptions) if options.fit_body else None
+    fitted = (part_of(options, SourceOptions), options.partners) if options.fit_body else None
     return _name(
         *("scan", options.driver, options.missing, options.iuv_order, options.frames),
         *(options.driver_kind, options.driver_person, options.estimator, options.estimator_model),
-        fitted,
+        *(partners, fitted),
     )
 
 
 def source_name(options: RenderOptions) -> str:
     """Name a source's appearance, the feature map; jobs of one name share it."""
     person = part_of(options, SourceOptions)
-    return _name("source", person, options.renderer, options.weights, options.adapt)
+    words = person, options.partners, options.renderer, options.weights, options.adapt
+    # what is behind is among the files that were looked at
+    return _name("source", *words, options.background_file)
 
 
 @cache

@@ -25,12 +25,13 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.files import check_readable
 from motion_transfer.media.iuv.formats import names_file
 from motion_transfer.media.structured import shown
-from motion_transfer.option import list_options
+from motion_transfer.option import list_options, parse_background
 from motion_transfer.render.inputs import audio_files, driver_files
 from motion_transfer.render.options import NO_AUDIO, RenderOptions
 from motion_transfer.weights import SHIPPED, find_weights
 
 OPTIONS = {entry.word: entry for entry in list_options(RenderOptions)}
+MAY_BE_FOLDERS = ("source", "driver", "partner", "background")
 BELOW_ROOT = ("output", "sheet")
 GLOB_MARKS = "*?["
 MOST_JOBS = 100_000  # what a gigabyte holds
@@ -162,7 +163,14 @@ class _Spread:
         try:
             given = {OPTIONS[word].name: self._value(word, value) for word, value in words.items()}
             options = RenderOptions(**given)
-            reason = _unwritable(options.output.suffix, options.codec, options.crf)
+            reason = _unwritable(
+                options.output.suffix,
+                options.codec,
+                options.crf,
+                options.transparent,
+                options.alpha,
+                options.pix_fmt,
+            )
         except InputError as error:
             raise ManifestError(f"{self._text.where(place)}: {error}") from None
         if reason:
@@ -181,11 +189,14 @@ class _Spread:
 
     def _value(self, word: str, value: Any) -> Any:
         """Read a value; paths are laid in the manifest's folder."""
-        if word == "garments":
+        if OPTIONS[word].kind in ("garments", "partners"):
             value = [
                 {**g, **{k: str(self._folder / g[k]) for k in ("photo", "iuv") if g.get(k)}}
                 for g in value
             ]
+        elif OPTIONS[word].kind == "background":
+            if isinstance(parse_background(value), Path):
+                value = str(self._laid(word, value))
         elif OPTIONS[word].kind == "path" and word not in BELOW_ROOT:
             return self._laid(word, value)
         elif OPTIONS[word].kind == "paths":
@@ -306,13 +317,16 @@ def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
         if options.estimator_model is not None:
             paths.append(("estimator model", options.estimator_model))
         paths += [("garment", garment.photo) for garment in options.garments]
+        paths += [("partner", partner.photo) for partner in options.partners]
+        if options.background_file is not None:
+            paths.append(("background", options.background_file))
         paths += [("audio", path) for path in audio_files(options)]
         for what, path in paths:
             if path in known:
                 continue
             known.add(path)
             try:
-                check_readable(path, what, folder=what in ("source", "driver"))
+                check_readable(path, what, folder=what in MAY_BE_FOLDERS)
             except InputError as error:
                 yield f"job {job.index} ({job.name}): {error}"
 
@@ -328,12 +342,26 @@ def _stem(path: str) -> str:
 
 
 @cache
-def _unwritable(suffix: str, codec: str | None, crf: int | None) -> str:
+def _unwritable(
+    suffix: str,
+    codec: str | None,
+    crf: int | None,
+    transparent: bool,
+    alpha: str,
+    pix_fmt: str | None,
+) -> str:
     """Say why no `ANY_OUTPUT` of that ending and codec can be written; nothing if it can."""
     from motion_transfer.media.output.formats import choose_format  # loads the libraries of codecs
 
     try:
-        choose_format(Path(f"{ANY_OUTPUT}{suffix}"), codec=codec, crf=crf)
+        choose_format(
+            Path(f"{ANY_OUTPUT}{suffix}"),
+            codec=codec,
+            crf=crf,
+            transparent=transparent,
+            alpha=alpha,
+            pix_fmt=pix_fmt,
+        )
     except InputError as error:
         return str(error)
     return ""

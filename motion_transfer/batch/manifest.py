@@ -52,6 +52,16 @@ class GarmentEntry(BaseModel):
     iuv: str | None = Field(None, description="Its IUV; else STEM_IUV.png beside it.")
 
 
+class PartnerEntry(BaseModel):
+    """Who takes the place of somebody else in the driver."""
+
+    model_config = STRICT
+
+    photo: str = Field(description="Photo of the person.")
+    person: str = Field(description="Whose motion it is, as --driver-person.")
+    iuv: str | None = Field(None, description="The photo's IUV; else STEM_IUV.png beside it.")
+
+
 def _one_or_several(value: Any) -> Any:
     """Say in one line what pydantic says in one for each type of a union."""
     paths = value if isinstance(value, list) else [value]
@@ -72,7 +82,9 @@ def _type_of(entry: Option) -> Any:
         "switch": bool,
         "rate": str | float,
         "frames": str | int,
+        "number": float,
         "garments": list[GarmentEntry],
+        "partners": list[PartnerEntry],
         "paths": Paths,
     }
     return kinds.get(entry.kind, str)

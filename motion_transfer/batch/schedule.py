@@ -194,7 +194,8 @@ class Scheduler:
             if active.scan.state == active.source.state == "ready":
                 active.stage = "preparing"
                 blobs = (active.scan.blobs["scan"], active.source.blobs["source"])
-                return Task(tasks.prepare, (options, *blobs), active)
+                arguments = (options, *blobs, self.state.estimates)
+                return Task(tasks.prepare, arguments, active)
         elif active.stage == "rendering" and active.todo:
             return self._chunk_task(active, place)
         elif active.stage == "rendering" and not active.left and not active.running:
@@ -219,7 +220,7 @@ class Scheduler:
             active.blob_name,
             active.prepared,
             active.source.name,
-            active.source.blobs["appearance"],
+            active.source.blobs["appearances"],
             active.work.path,
             active.job.options.output,
             [(c.index, active.work.temporary(c.piece), c.piece) for c in chunks],
@@ -286,9 +287,9 @@ class Scheduler:
             self.listener(events.JobNotice(task.owner.name, notice))
 
     def _encode_done(self, task: Task, result: tuple[bytes, bytes, tuple[str, ...]]) -> None:
-        source, appearance, notices = result
+        sources, appearances, notices = result
         name = task.owner.source.name
-        blobs = {"source": (f"source-{name}", source), "appearance": (name, appearance)}
+        blobs = {"source": (f"source-{name}", sources), "appearances": (name, appearances)}
         self._ready(task, blobs)
         self.feature_maps += 1
         for notice in notices:

@@ -59,15 +59,15 @@ class Outline:
 
 
 def scan(options: RenderOptions, folder: Path) -> tuple[bytes, list[str]]:
-    """Look through a driver.
+    """Look through a driver, for each of the cast.
 
     Args:
         folder: Where the IUV of drivers is kept that are raw pictures.
-    Returns: The scan, and what is worth saying.
+    Returns: The scans, and what is worth saying.
     Raises: InputError, IuvFileError.
     """
     from motion_transfer.events import Event, Notice
-    from motion_transfer.render.driver import scan_driver
+    from motion_transfer.render.composition import scan_cast
 
     notices: list[str] = []
 
@@ -75,40 +75,49 @@ def scan(options: RenderOptions, folder: Path) -> tuple[bytes, list[str]]:
         if isinstance(event, Notice):
             notices.append(event.message)
 
-    scanned = scan_driver(options, folder, listen, workers=1)
-    return pickle.dumps(scanned, PICKLE_PROTOCOL), notices
+    scanned = scan_cast(options, folder, listen, workers=1)
+    return pickle.dumps(scanned, PICKLE_PROTOCOL), list(dict.fromkeys(notices))
 
 
 def encode(options: RenderOptions) -> tuple[bytes, bytes, tuple[str, ...]]:
-    """Read a source and compute its appearance, the feature map.
+    """Read the source of each of the cast and compute its appearance, the feature map.
 
-    Returns: The source with what it was read from, its appearance, and what is worth saying.
+    Returns: The sources with what they were read from, their appearances, and what is worth saying.
     Raises: InputError, WeightsError.
     """
     from motion_transfer.events import ignore
-    from motion_transfer.render.composition import open_recipe, settle_weights
-    from motion_transfer.render.inputs import appearance_files
-    from motion_transfer.render.source import read_source
+    from motion_transfer.render.composition import (
+        cast_files,
+        open_recipe,
+        read_cast,
+        settle_weights,
+    )
 
     options = settle_weights(options, ignore)
-    inputs = Inputs(appearance_files(options))
+    inputs = Inputs(cast_files(options))
     recipe = open_recipe(options)
-    source = read_source(options, recipe.texture_size)
-    appearance = recipe.appearance_of(source)
-    told = pickle.dumps((source, inputs), PICKLE_PROTOCOL)
-    return told, pickle.dumps(appearance, PICKLE_PROTOCOL), source.notes
+    sources = read_cast(options, recipe, ignore)
+    appearances = tuple(recipe.appearance_of(source) for source in sources)
+    told = pickle.dumps((sources, inputs), PICKLE_PROTOCOL)
+    notes = tuple(dict.fromkeys(note for source in sources for note in source.notes))
+    return told, pickle.dumps(appearances, PICKLE_PROTOCOL), notes
 
 
-def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[bytes, Outline]:
+def prepare(
+    options: RenderOptions, scanned: Fetch, encoded: Fetch, folder: Path
+) -> tuple[bytes, Outline]:
     """Plan a run and put its parts together.
 
+    Args:
+        folder: Where what is found in raw pictures is kept.
     Raises: InputError and its kinds, also if a source is no longer what its appearance was made
         from.
     """
-    from motion_transfer.events import ignore
+    from motion_transfer.events import Event, Notice
     from motion_transfer.render.composition import (
+        check_early,
         open_recipe,
-        plan_run,
+        plan_cast,
         prepare_run,
         settle_weights,
     )
@@ -116,12 +125,20 @@ def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[byt
     from motion_transfer.render.plan import describe_missing
     from motion_transfer.render.run import output_key, piece_of
 
-    driver = pickle.loads(scanned())
-    plan = plan_run(options, driver)
-    options = settle_weights(options, ignore)  # in the cache by now
+    notices: list[str] = []
+
+    def listen(event: Event) -> None:
+        if isinstance(event, Notice):
+            notices.append(event.message)
+
+    check_early(options)
+    scans = pickle.loads(scanned())
+    plans = plan_cast(options, scans)
+    options = settle_weights(options, listen)  # in the cache by now
     recipe = open_recipe(options)
-    source, inputs = pickle.loads(encoded())
-    run = prepare_run(options, driver, plan, recipe, source, inputs, ignore)
+    sources, inputs = pickle.loads(encoded())
+    run = prepare_run(options, scans, plans, recipe, sources, inputs, folder, listen)
+    plan = run.plan
     chunks = tuple(
         ChunkOutline(c.index, c.start, c.stop, piece_of(run, c), run.chunk_keys[c.index])
         for c in plan.chunks
@@ -135,7 +152,7 @@ def prepare(options: RenderOptions, scanned: Fetch, encoded: Fetch) -> tuple[byt
         # a thread that draws for itself would gain nothing from a second chunk
         CHUNKS_AT_ONCE if recipe.occupies != "nothing" else 1,
         output_key(run),
-        "; ".join(filter(None, [*(run.audio.notes if run.audio else ()), missing])),
+        "; ".join(filter(None, [*dict.fromkeys(notices), missing])),
         run.inputs.keys(),
     )
     return pickle.dumps(run, PICKLE_PROTOCOL), outline

@@ -7,9 +7,8 @@ from typing import Any
 
 import click
 
-from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
+from motion_transfer.cli.options import FILE, SectionCommand, described_options, pair_words, section
 from motion_transfer.cli.progress import choose_listener
-from motion_transfer.cli.run import pair_garments
 from motion_transfer.cli.terminal import tell
 from motion_transfer.option import options_from_words
 from motion_transfer.render.options import AdaptOptions
@@ -43,7 +42,7 @@ def adapt(
     """
     from motion_transfer.render.adapted import write_adapted
 
-    pairs = pair_garments(garments, garment_parts)
+    pairs = pair_words(garments, garment_parts, "garment", "parts")
     options = options_from_words(AdaptOptions, {**words, "garments": pairs})
     write_adapted(options, output, choose_listener(quiet=quiet, as_json=as_json))
     if not quiet and not as_json:

@@ -10,10 +10,18 @@ from typing import Any
 
 import click
 
+from motion_transfer.errors import InputError
 from motion_transfer.option import Option, list_options
 
 FILE = click.Path(path_type=Path)
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+SECOND_WORDS = {
+    "garments": ("PARTS", "Such as torso,upper-legs; `mt info parts` lists the names."),
+    "partners": ("WHO", "Whose motion that is: an index from the left, or a box; as --person."),
+}
+"""What goes with each photo of an option that has two flags, and its help."""
 
 
 class SectionOption(click.Option):
@@ -95,12 +103,12 @@ def add_options(adders: list[Decorator]) -> Decorator:
 
 def _decorators(entry: Option, *, required: bool) -> list[Decorator]:
     common: dict[str, Any] = {"cls": SectionOption, "section": entry.section, "help": entry.help}
-    if entry.kind == "garments":
-        photo, parts = entry.flags
-        names = "Such as torso,upper-legs; `mt info parts` lists the names."
+    if entry.kind in SECOND_WORDS:
+        photo, second = entry.flags
+        metavar, names = SECOND_WORDS[entry.kind]
         return [
             click.option(photo, entry.name, multiple=True, metavar="PHOTO[,IUV]", **common),
-            click.option(parts, multiple=True, metavar="PARTS", **{**common, "help": names}),
+            click.option(second, multiple=True, metavar=metavar, **{**common, "help": names}),
         ]
     if entry.kind == "flag":
         common |= {"is_flag": True, "default": None}
@@ -111,3 +119,22 @@ def _decorators(entry: Option, *, required: bool) -> list[Decorator]:
         common |= {"type": numbers.get(entry.kind, str), "metavar": entry.metavar}
         common |= {"required": required, "multiple": entry.kind in ("paths", "words")}
     return [click.option(*entry.flags, entry.name, **common)]
+
+
+def pair_words(
+    photos: tuple[str, ...], words: tuple[str, ...], option: str, name: str
+) -> list[dict[str, str]]:
+    """Match `PHOTO[,IUV]` with what goes with each, by order, as a manifest would have them.
+
+    Args:
+        option: The flag of the photos without dashes; the other's is `option-name`.
+    Raises: InputError if one has no partner.
+    """
+    if len(photos) != len(words):
+        raise InputError(
+            f"{len(photos)} --{option} but {len(words)} --{option}-{name}; give one for each"
+        )
+    return [
+        dict(zip(("photo", "iuv"), photo.split(",", 1), strict=False)) | {name: word}
+        for photo, word in zip(photos, words, strict=True)
+    ]

@@ -10,9 +10,8 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
+from motion_transfer.cli.options import FILE, SectionCommand, described_options, pair_words, section
 from motion_transfer.cli.progress import choose_listener
-from motion_transfer.cli.run import pair_garments
 from motion_transfer.cli.terminal import tell
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
@@ -51,6 +50,8 @@ def preview(
     no_open: bool,
     garments: tuple[str, ...],
     garment_parts: tuple[str, ...],
+    partners: tuple[str, ...],
+    partner_person: tuple[str, ...],
     **words: Any,
 ) -> None:
     """See a run frame by frame in the browser, before it is rendered.
@@ -63,7 +64,8 @@ def preview(
     mt preview jobs/shoot.yaml --job 3
     mt preview --source photo.png --driver iuv_frames/ --frame 12 -o frame.png
     """
-    words["garments"] = pair_garments(garments, garment_parts)
+    words["partners"] = pair_words(partners, partner_person, "partner", "person")
+    words["garments"] = pair_words(garments, garment_parts, "garment", "parts")
     if manifest is not None:
         _refuse_others(context, manifest)
         options = _options_of_job(manifest, job)

@@ -24,6 +24,7 @@ STAGE_WORDS = {
     "adapt": "learning the person",
     "compare": "comparing bodies",
     "estimate": "finding the driver's person",
+    "background": "taking the driver's person out",
     "scan": "reading driver",
     "render": "rendering",
 }

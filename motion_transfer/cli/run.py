@@ -8,9 +8,14 @@ from typing import Any
 
 import click
 
-from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
+from motion_transfer.cli.options import (
+    FILE,
+    SectionCommand,
+    described_options,
+    pair_words,
+    section,
+)
 from motion_transfer.cli.progress import choose_listener
-from motion_transfer.errors import InputError
 from motion_transfer.option import options_from_words
 from motion_transfer.render.options import RenderOptions
 
@@ -24,6 +29,8 @@ output_option = section("Output")
 def run(
     garments: tuple[str, ...],
     garment_parts: tuple[str, ...],
+    partners: tuple[str, ...],
+    partner_person: tuple[str, ...],
     quiet: bool,
     as_json: bool,
     **words: Any,
@@ -37,26 +44,18 @@ def run(
     mt run --source photo.png --driver iuv_frames/ -o out.mp4
     mt run --source front.jpg --source back.jpg --driver dance.mp4 -o out.mp4
     mt run --source photo.png --driver dance.mp4 --background photo --compare -o out.mp4
+    mt run --source photo.png --driver dance.mp4 --background transparent -o out.webm
+    mt run --source photo.png --driver dance.mp4 --background street.mp4 --size background \
+           --place 0.5,0.9,1.5 --shadow -o out.mp4
     mt run --source me.png --driver me_IUV.png --garment dress.png \\
            --garment-parts torso,upper-legs --background photo -o dressed.png
     """
     from motion_transfer.render.run import run as render
 
-    pairs = pair_garments(garments, garment_parts)
-    options = options_from_words(RenderOptions, {**words, "garments": pairs})
+    words["garments"] = pair_words(garments, garment_parts, "garment", "parts")
+    words["partners"] = pair_words(partners, partner_person, "partner", "person")
+    options = options_from_words(RenderOptions, words)
     render(options, choose_listener(quiet=quiet, as_json=as_json))
-
-
-def pair_garments(garments: tuple[str, ...], parts: tuple[str, ...]) -> list[dict[str, str]]:
-    """Match `PHOTO[,IUV]` with their parts, by order. Raises: InputError if one has no partner."""
-    if len(garments) != len(parts):
-        raise InputError(
-            f"{len(garments)} --garment but {len(parts)} --garment-parts; give one for each"
-        )
-    return [
-        dict(zip(("photo", "iuv"), garment.split(",", 1), strict=False)) | {"parts": words}
-        for garment, words in zip(garments, parts, strict=True)
-    ]
 
 
 @click.command()

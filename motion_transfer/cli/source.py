@@ -7,9 +7,8 @@ from typing import Any
 
 import click
 
-from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
+from motion_transfer.cli.options import FILE, SectionCommand, described_options, pair_words, section
 from motion_transfer.cli.progress import choose_listener
-from motion_transfer.cli.run import pair_garments
 from motion_transfer.cli.terminal import tell
 from motion_transfer.option import options_from_words
 from motion_transfer.render.options import KeepOptions
@@ -54,7 +53,7 @@ def save(
     """
     from motion_transfer.render.keep import keep_source
 
-    pairs = pair_garments(garments, garment_parts)
+    pairs = pair_words(garments, garment_parts, "garment", "parts")
     options = options_from_words(KeepOptions, {**words, "garments": pairs})
     keep_source(options, output, choose_listener(quiet=quiet, as_json=False))
     if not quiet:

@@ -1,98 +1,118 @@
-"""From a rendered crop to an output frame: the background, the paste, panels side by side."""
+"""From rendered crops to an output frame: people laid over a background, panels side by side."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from motion_transfer.drawing.person import disc, occupancy
+from motion_transfer.drawing.backgrounds import Frame
+from motion_transfer.drawing.light import cast_shadow, relight
 from motion_transfer.drawing.renderers.interface import Renderer
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import Window
-from motion_transfer.option import parse_colour
 
-PERSON_GROWTH = 0.05  # of the person's height: hair and clothes reach beyond the IUV by about that
-ALPHA_GROWTH = 0.02  # likewise, where alpha shows them: single hairs and their shadow
-FAINT_ALPHA = 32  # of 255; less is noise of whoever made the alpha
 PART_COLOUR_STEP = 10  # 24 parts over 0..240, as DensePose draws them
+CHECKER_PX, CHECKER_LEVELS = 16, (255, 204)  # as editors show that nothing is there
 
-Frame = UInt8[np.ndarray, "H W 3"]
+Rgba = UInt8[np.ndarray, "S S 4"]
+Picture = UInt8[np.ndarray, "H W C"]
+"""An output frame: RGB, or where the background is transparent, RGBA, not multiplied by alpha."""
 
 
-def make_background(
-    background: str, size: tuple[int, int], source: Source, *, in_place: bool
-) -> Frame:
-    """Make a background of (height, width): one colour, or the source's photo.
+@dataclass(frozen=True)
+class Spot:
+    """Where somebody is in an output frame, px.
 
-    The photo covers the frame, centred, and loses its person, whose place is inpainted; with
-    `in_place` (the driver is the source's own IUV) it stays as it is.
+    Attributes:
+        window: Where the crop goes.
+        ground: The row on which the person stands.
     """
-    height, width = size
-    colour = parse_colour(background)
-    if colour is not None:
-        return np.full((height, width, 3), colour, np.uint8)
-    photo = source.photo.rgb
-    if not in_place:
-        photo = remove_person(photo, source.iuv, source.alpha)
-    scale = max(height / photo.shape[0], width / photo.shape[1])
-    covering = (
-        max(width, round(photo.shape[1] * scale)),
-        max(height, round(photo.shape[0] * scale)),
-    )
-    if covering != photo.shape[1::-1]:
-        kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-        photo = cv2.resize(photo, covering, interpolation=kind)
-    top, left = (photo.shape[0] - height) // 2, (photo.shape[1] - width) // 2
-    return np.ascontiguousarray(photo[top : top + height, left : left + width])
+
+    window: Window
+    ground: int = 0
 
 
-def remove_person(
-    photo: Frame,
-    iuv: UInt8[np.ndarray, "H W 3"],
-    alpha: UInt8[np.ndarray, "H W"] | None = None,
-) -> Frame:
-    """Paint a photo's person over from around; alpha knows hair and clothes, too."""
-    mask = occupancy(iuv)
-    growth = PERSON_GROWTH
-    if alpha is not None:
-        mask, growth = mask | (alpha >= FAINT_ALPHA).astype(np.uint8), ALPHA_GROWTH
-    rows = np.flatnonzero(mask.any(1))
-    radius = max(2, (rows[-1] - rows[0] + 1) * growth)
-    scale = min(1, 512 / max(photo.shape[:2]))  # the fill is smooth, and slow at full size
-    small_size = (max(1, round(photo.shape[1] * scale)), max(1, round(photo.shape[0] * scale)))
-    grown = cv2.dilate(mask, disc(radius))
-    small = cv2.resize(photo, small_size, interpolation=cv2.INTER_AREA)
-    small_mask = cv2.resize(grown, small_size, interpolation=cv2.INTER_AREA)
-    small_mask = cv2.dilate(small_mask, np.ones((3, 3), np.uint8))
-    filled = cv2.inpaint(small, small_mask, 5, cv2.INPAINT_TELEA)
-    filled = cv2.resize(filled, photo.shape[1::-1], interpolation=cv2.INTER_CUBIC)
-    return np.where(grown[..., None] > 0, filled, photo)
+@dataclass(frozen=True)
+class Figure:
+    """Somebody in an output frame.
+
+    Attributes:
+        table: Changes the person's light, see `match_light`; None: it stays.
+    """
+
+    rgba: Rgba
+    spot: Spot
+    table: UInt8[np.ndarray, "1 256 3"] | None = None
 
 
-def paste(frame: Frame, rgba: UInt8[np.ndarray, "S S 4"], window: Window) -> None:
+def paste(frame: Picture, rgba: Rgba, window: Window) -> None:
     """Lay a crop over the frame, in place, where its window lies."""
-    if rgba.shape[0] != window.side:
-        kind = cv2.INTER_AREA if rgba.shape[0] > window.side else cv2.INTER_CUBIC
-        rgba = cv2.resize(rgba, (window.side, window.side), interpolation=kind)
-    rows, columns, own_rows, own_columns = window.visible(*frame.shape[:2])
-    over = rgba[own_rows, own_columns]
-    target = frame[rows, columns]
+    lay_over(frame, _scale(rgba, window.side), window.x, window.y)
+
+
+def lay_over(frame: Picture, rgba: UInt8[np.ndarray, "h w 4"], x: int, y: int) -> None:
+    """Lay a picture over the frame, in place, its corner at (x, y); it may reach beyond."""
+    top, left = max(0, -y), max(0, -x)
+    over = rgba[top : max(0, frame.shape[0] - y), left : max(0, frame.shape[1] - x)]
+    if not over.size:
+        return
+    y, x = y + top, x + left
+    target = frame[y : y + over.shape[0], x : x + over.shape[1]]
     coverage = cv2.extractChannel(over, 3)
     left, top, width, height = cv2.boundingRect(coverage)
     if not width:
         return
     person = np.s_[top : top + height, left : left + width]
     over, target, coverage = over[person], target[person], coverage[person]
-    colour = cv2.cvtColor(over, cv2.COLOR_RGBA2RGB)
+    colour = over if frame.shape[2] == 4 else cv2.cvtColor(over, cv2.COLOR_RGBA2RGB)
     edge = np.nonzero(cv2.inRange(coverage, 1, 254))
     weight = coverage[edge][:, None].astype(np.uint16)
-    # + 127: rounds to the nearest level in whole numbers
-    blend = (colour[edge] * weight + target[edge] * (255 - weight) + 127) // 255
+    if frame.shape[2] == 4:
+        blend = _blend_rgba(over[edge], target[edge])
+    else:
+        # + 127: rounds to the nearest level in whole numbers
+        blend = (colour[edge] * weight + target[edge] * (255 - weight) + 127) // 255
     cv2.copyTo(colour, cv2.inRange(coverage, 255, 255), target)
     target[edge] = blend.astype(np.uint8)
+
+
+def _blend_rgba(over: UInt8[np.ndarray, "N 4"], under: UInt8[np.ndarray, "N 4"]) -> np.ndarray:
+    """Lay RGBA over RGBA, neither multiplied by alpha; `over` covers something everywhere.
+
+    Source: Porter and Duff, "Compositing Digital Images" (SIGGRAPH 1984), their operator "over".
+    """
+    near, far = over.astype(np.float32), under.astype(np.float32)
+    far_weight = far[:, 3:] * (1 - near[:, 3:] / 255)
+    alpha = near[:, 3:] + far_weight
+    colour = (near[:, :3] * near[:, 3:] + far[:, :3] * far_weight) / alpha
+    return np.hstack([colour, alpha]).round()
+
+
+def _scale(rgba: Rgba, side: int) -> Rgba:
+    """Scale a crop; colours count by their coverage, as those of nobody mean nothing."""
+    if len(rgba) == side:
+        return rgba
+    kind = cv2.INTER_AREA if len(rgba) > side else cv2.INTER_CUBIC
+    weighted = cv2.cvtColor(rgba, cv2.COLOR_RGBA2mRGBA)
+    scaled = cv2.resize(weighted, (side, side), interpolation=kind)
+    # a cubic overshoots, and no colour is brighter than what covers
+    scaled[..., :3] = np.minimum(scaled[..., :3], scaled[..., 3:])
+    return cv2.cvtColor(scaled, cv2.COLOR_mRGBA2RGBA)
+
+
+def show_alpha(picture: Picture) -> Frame:
+    """Show a picture on a checkerboard where it is transparent."""
+    if picture.shape[2] == 3:
+        return picture
+    rows, columns = np.indices(picture.shape[:2], np.uint16) // CHECKER_PX
+    board = np.where((rows + columns) % 2, *map(np.uint8, CHECKER_LEVELS))
+    frame = cv2.cvtColor(board, cv2.COLOR_GRAY2RGB)
+    lay_over(frame, picture, 0, 0)
+    return frame
 
 
 def colour_iuv(iuv: UInt8[np.ndarray, "H W 3"]) -> Frame:
@@ -114,10 +134,16 @@ class Comparison:
         self._blank = np.full((height, photo_width + 2 * width, 3), 255, np.uint8)
         self._blank[:, :photo_width] = cv2.resize(photo, (photo_width, height), interpolation=kind)
         self._panels = (photo_width, photo_width + width)
+        self._panel = (height, width)
         self.size = (height, photo_width + 2 * width)
 
     def frame(self, iuv: UInt8[np.ndarray, "H W 3"], result: Frame) -> Frame:
-        """Lay out one output frame; the result may be a pixel larger than the IUV."""
+        """Lay out one output frame; the result may be a pixel larger than the IUV, or another."""
+        height, width = self._panel
+        if not (0 <= height - iuv.shape[0] <= 1 and 0 <= width - iuv.shape[1] <= 1):
+            scale = min(height / iuv.shape[0], width / iuv.shape[1])
+            size = max(1, int(iuv.shape[1] * scale)), max(1, int(iuv.shape[0] * scale))
+            iuv = cv2.resize(iuv, size, interpolation=cv2.INTER_NEAREST_EXACT)
         picture = self._blank.copy()
         for left, panel in zip(self._panels, (colour_iuv(iuv), result), strict=True):
             picture[: panel.shape[0], left : left + panel.shape[1]] = panel
@@ -126,38 +152,68 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Canvas:
-    """An empty output, and how a rendered crop is laid into it.
+    """How people and a background become an output frame.
 
     Attributes:
-        background: An empty output frame, without the comparison's other panels.
-        crop: Whether the output is the window itself, at the renderer's working size.
+        height, width: Of the result, px.
+        transparent: Whether it has no background, and alpha instead.
+        shadows: Whether people cast one.
         comparison: Adds source and IUV beside the result, if wanted.
     """
 
-    background: Frame
-    crop: bool
-    comparison: Comparison | None
+    height: int
+    width: int
+    transparent: bool = False
+    shadows: bool = False
+    comparison: Comparison | None = None
 
     @property
     def size(self) -> tuple[int, int]:
         """The output's (width, height), px."""
-        height, width = self.comparison.size if self.comparison else self.background.shape[:2]
+        height, width = self.comparison.size if self.comparison else (self.height, self.width)
         return width, height
 
     def lay_out(
-        self, iuv: Frame, crop: Frame, rgba: UInt8[np.ndarray, "S S 4"], window: Window
-    ) -> Frame:
-        """Make an output frame from a target IUV, its crop, and what was rendered for the crop."""
-        frame = self.background.copy()
-        if self.crop:
-            side = len(frame)  # of the largest shot's window; others are enlarged to it
-            paste(frame, rgba, Window(0, 0, side))
-            iuv = cv2.resize(crop, (side, side), interpolation=cv2.INTER_NEAREST_EXACT)
+        self,
+        background: Frame | None,
+        figures: Sequence[Figure],
+        iuv: UInt8[np.ndarray, "H W 3"],
+    ) -> Picture:
+        """Make an output frame.
+
+        Args:
+            background: Of the canvas' height and width; None where it is transparent.
+            figures: Whoever stands lower in the frame is nearer, and covers the others.
+            iuv: What the comparison shows.
+        """
+        if background is None:
+            frame = np.zeros((self.height, self.width, 4), np.uint8)
         else:
-            paste(frame, rgba, window)
+            frame = background.copy()
+        for figure in sorted(figures, key=lambda figure: figure.spot.ground):
+            if self.shadows:
+                _lay_shadow(frame, figure)
+            rgba = figure.rgba if figure.table is None else relight(figure.rgba, figure.table)
+            paste(frame, rgba, figure.spot.window)
         return self.comparison.frame(iuv, frame) if self.comparison else frame
 
-    def draw(self, renderer: Renderer, iuv: Frame, window: Window) -> Frame:
-        """Draw one output frame of a target IUV, H x W x 3, whose person a window holds."""
-        crop = window.cut(iuv, renderer.working_size(window.side))
-        return self.lay_out(iuv, crop, renderer.render(crop[None])[0], window)
+
+def _lay_shadow(frame: Picture, figure: Figure) -> None:
+    window = figure.spot.window
+    ground = (figure.spot.ground - window.y) / window.side
+    shade = cast_shadow(cv2.extractChannel(figure.rgba, 3), ground)
+    if shade is None:
+        return
+    black = np.zeros((window.side, 2 * window.side, 4), np.uint8)
+    black[..., 3] = cv2.resize(shade, black.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    lay_over(frame, black, window.x - window.side // 2, window.y)
+
+
+def draw_over(
+    background: Frame, renderer: Renderer, iuv: UInt8[np.ndarray, "H W 3"], window: Window
+) -> Frame:
+    """Draw the person of a target IUV, whom a window holds, over a background of its size."""
+    frame = background.copy()
+    crop = window.cut(iuv, renderer.working_size(window.side))
+    paste(frame, renderer.render(crop[None])[0], window)
+    return frame

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
-from motion_transfer.drawing.canvas import Canvas, make_background
+from motion_transfer.drawing.backgrounds import make_background
+from motion_transfer.drawing.canvas import draw_over
 from motion_transfer.drawing.engines import ANYTHING, Wish
 from motion_transfer.drawing.person import bounding_box
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
@@ -106,8 +107,8 @@ class RenderedCandidate:
         def draw(_pair: Pair, target: PersonPicture) -> Image:
             size = (target.iuv.shape[0], target.iuv.shape[1])
             background = make_background(self._background, size, prepared, in_place=False)
-            canvas = Canvas(background, crop=False, comparison=None)
-            return canvas.draw(renderer, target.iuv, plan_window([bounding_box(target.iuv)]))
+            window = plan_window([bounding_box(target.iuv)])
+            return draw_over(background, renderer, target.iuv, window)
 
         return draw
 

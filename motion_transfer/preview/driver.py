@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 import time
 from bisect import bisect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -22,7 +22,14 @@ from motion_transfer.preview.queue import ByteCache
 from motion_transfer.render.composition import plan_run
 from motion_transfer.render.driver import Driver
 from motion_transfer.render.options import RenderOptions
-from motion_transfer.render.plan import FramePlan, SeenFrame, Shot, digest_of_iuv, frame_range
+from motion_transfer.render.plan import (
+    DriverPlan,
+    FramePlan,
+    SeenFrame,
+    Shot,
+    digest_of_iuv,
+    frame_range,
+)
 
 BLOCK_FRAMES = 16  # decoded in one go: half a second of playing
 CACHED_BYTES = 256 * 2**20
@@ -36,7 +43,7 @@ may take a second."""
 NOBODY = SeenFrame(People((), 0), "")
 
 
-@dataclass
+@dataclass(eq=False)
 class PreviewedDriver:
     """What is known of a driver so far; written by the thread that looks, read by any.
 
@@ -128,6 +135,7 @@ class FramePlans:
         known: Who is drawn in a frame, by its index in the driver; in order.
         shots: Ranges of driver frames, and the window of each.
         missing: Half-open ranges of driver frames in which the person was not found.
+        plan: That of a run, of the driver's frames `planned`, in order.
         exact: Whether this is what a run would do; else it goes by a sample of the frames.
     """
 
@@ -135,7 +143,13 @@ class FramePlans:
     known: Mapping[int, FramePlan]
     shots: tuple[Shot, ...]
     missing: tuple[tuple[int, int], ...]
+    plan: DriverPlan
+    planned: Sequence[int]
     exact: bool
+
+    def place_in_plan(self, index: int) -> int:
+        """Find the planned frame that is nearest before a driver's frame, or the first."""
+        return max(0, bisect(self.planned, index) - 1)
 
     @property
     def largest_side(self) -> int:
@@ -186,6 +200,8 @@ def plan_frames(driver: PreviewedDriver, options: RenderOptions) -> FramePlans:
         {index: entry for index, entry in known.items() if entry.held is None},
         (Shot(chosen.start, chosen.stop, plan.shots[0].window),),
         (),
+        plan,
+        frames,
         exact=False,
     )
 
@@ -216,4 +232,4 @@ def _plan_exactly(driver: PreviewedDriver, options: RenderOptions, chosen: range
     missing = tuple(
         stretch for stretch in plan.missing if not all(i in driver.broken for i in range(*stretch))
     )
-    return FramePlans(chosen, known, shots, missing, exact=True)
+    return FramePlans(chosen, known, shots, missing, plan, chosen, exact=True)

@@ -10,8 +10,8 @@ from typing import Any
 import yaml
 
 from motion_transfer.media.iuv.formats import names_file
-from motion_transfer.option import Option, list_options
-from motion_transfer.render.options import NO_AUDIO, Garment, RenderOptions
+from motion_transfer.option import Option, list_options, parse_background
+from motion_transfer.render.options import NO_AUDIO, Garment, Partner, RenderOptions
 from motion_transfer.weights import SHIPPED
 from nhrr_core.parts import PART_NAMES
 
@@ -24,10 +24,10 @@ def command_line(options: RenderOptions) -> str:
     words = ["mt", "run"]
     for entry, value in _written(options):
         flag = entry.flags[0]
-        if entry.kind == "garments":
-            for garment in value:
-                iuv = f",{garment.iuv}" if garment.iuv else ""
-                words += [flag, f"{garment.photo}{iuv}", entry.flags[1], _parts(garment)]
+        if entry.kind in ("garments", "partners"):
+            for each in value:
+                iuv = f",{each.iuv}" if each.iuv else ""
+                words += [flag, f"{each.photo}{iuv}", entry.flags[1], _second_word(each)[1]]
         elif entry.kind == "paths":
             words += [word for path in value for word in (flag, str(path))]
         elif entry.kind == "flag":
@@ -68,21 +68,24 @@ def _written(options: RenderOptions) -> list[tuple[Option, Any]]:
 
 
 def _manifest_value(entry: Option, value: Any, folder: Path) -> Any:
-    if entry.kind == "garments":
+    if entry.kind in ("garments", "partners"):
         return [
             {
-                "photo": _below(garment.photo, folder),
-                "parts": _parts(garment),
-                **({"iuv": _below(garment.iuv, folder)} if garment.iuv else {}),
+                "photo": _below(each.photo, folder),
+                **dict([_second_word(each)]),
+                **({"iuv": _below(each.iuv, folder)} if each.iuv else {}),
             }
-            for garment in value
+            for each in value
         ]
+    if entry.kind == "background":
+        behind = parse_background(value)
+        return _below(behind, folder) if isinstance(behind, Path) else value
     if entry.kind == "path":
         return _manifest_path(entry, value, folder)
     if entry.kind == "paths":
         paths = [_manifest_path(entry, path, folder) for path in value]
         return paths if len(paths) > 1 else paths[0]
-    return value if entry.kind in ("flag", "switch", "integer") else _text(entry, value)
+    return value if entry.kind in ("flag", "switch", "integer", "number") else _text(entry, value)
 
 
 def _manifest_path(entry: Option, value: Path, folder: Path) -> str:
@@ -100,8 +103,11 @@ def _text(entry: Option, value: Any) -> str:
     return str(value)
 
 
-def _parts(garment: Garment) -> str:
-    return ",".join(PART_NAMES[part] for part in garment.parts)
+def _second_word(entry: Garment | Partner) -> tuple[str, str]:
+    """Write what a photo is given with, and its name in a manifest."""
+    if isinstance(entry, Partner):
+        return "person", entry.person
+    return "parts", ",".join(PART_NAMES[part] for part in entry.parts)
 
 
 def _below(path: Path, folder: Path) -> str:

@@ -119,7 +119,7 @@ class Guard:
             return 416, "only one range of bytes is sent at once"
         if scope["method"] == "POST":
             # no form of another page can send these types without asking first
-            is_file = scope["path"].split("/")[2:3] == ["sources"]
+            is_file = scope["path"].split("/")[2:3] in (["sources"], ["backgrounds"])
             wanted = "application/octet-stream" if is_file else "application/json"
             most = MOST_FILE_BYTES if is_file else MOST_BODY_BYTES
             if headers.get("content-type", "").split(";")[0].strip() != wanted:
@@ -203,6 +203,8 @@ def make_app(session: Future[Session], token: str, closing: Callable[[], bool]) 
         Route("/options", handlers.options, methods=["POST"]),
         Route("/source", handlers.choose_sources, methods=["POST"]),
         Route("/sources/{drop}/{name}", handlers.receive, methods=["POST"]),
+        Route("/background/{number}", handlers.background_picture),
+        Route("/backgrounds/{drop}/{name}", handlers.receive_background, methods=["POST"]),
         Route("/render", handlers.render, methods=["POST"]),
         Route("/render/stop", handlers.stop, methods=["POST"]),
         Route("/job", handlers.job, methods=["POST"]),
@@ -284,12 +286,30 @@ class _Handlers:
 
     async def receive(self, request: Request) -> Response:
         """Write a dropped file, and give the number by which it can be chosen as a source."""
+        session = await self._session()
+        path = await self._write_file(request)
+        return JSONResponse({"number": session.know_source(path)})
+
+    async def receive_background(self, request: Request) -> Response:
+        """Write a dropped file, and give the word by which it can be chosen as a background."""
+        session = await self._session()
+        path = await self._write_file(request)
+        return JSONResponse({"value": session.know_background(path)})
+
+    async def background_picture(self, request: Request) -> Response:
+        """Send a small picture of a background."""
+        try:
+            number = read_whole(request.path_params["number"])
+        except ValueError:
+            raise HTTPException(404, "there is no such background") from None
+        return await self._picture(request, (await self._session()).ask_background(number))
+
+    async def _write_file(self, request: Request) -> Path:
         session, words = await self._session(), request.path_params
         with await run_in_threadpool(session.dropped.begin, words["drop"], words["name"]) as upload:
             async for data in request.stream():
                 await run_in_threadpool(upload.write, data)
-            path = await run_in_threadpool(upload.finish)
-        return JSONResponse({"number": session.know_source(path)})
+            return await run_in_threadpool(upload.finish)
 
     async def choose_sources(self, request: Request) -> Response:
         """Take some of the known sources, the one that leads first; as before if one is unfit."""
@@ -327,7 +347,8 @@ class _Handlers:
                 words[name] = ":".join("" if end is None else str(end) for end in value)
         if any(not isinstance(value, str | int | float) for value in words.values()):
             raise InputError("values are text or numbers")
-        texts = {name: str(value) for name, value in words.items()}
+        # a switch comes as true or false, which text would not be
+        texts = {n: value if isinstance(value, bool) else str(value) for n, value in words.items()}
         session = await self._session()
         try:
             await run_in_threadpool(session.change, texts)

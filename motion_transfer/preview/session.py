@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.drawing.canvas import show_alpha
 from motion_transfer.drawing.renderers import DRAFT, RENDERERS
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import Window
@@ -23,12 +24,13 @@ from motion_transfer.events import Event, FramesDone, Notice, Stage
 from motion_transfer.media.pictures.photo import encode_jpeg, encode_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import list_options
+from motion_transfer.option import SCENES, list_options
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.preview.dropped import DroppedFiles
 from motion_transfer.preview.export import command_line, manifest_text
 from motion_transfer.preview.queue import ByteCache, DrawQueue, StaleError
 from motion_transfer.preview.rendering import Rendering, explain
+from motion_transfer.preview.scenes import draw_thumb
 from motion_transfer.preview.views import (
     Views,
     count_people,
@@ -36,6 +38,7 @@ from motion_transfer.preview.views import (
     shrink,
     write_proxies,
 )
+from motion_transfer.render.backdrop import no_pictures, open_background
 from motion_transfer.render.composition import frame_size
 from motion_transfer.render.driver import open_driver
 from motion_transfer.render.inputs import (
@@ -45,11 +48,18 @@ from motion_transfer.render.inputs import (
     iuv_names,
     photo_files,
 )
-from motion_transfer.render.options import DEFAULT_RATE, RenderOptions, is_kept, parse_window
+from motion_transfer.render.options import (
+    DEFAULT_RATE,
+    RenderOptions,
+    SceneOptions,
+    is_kept,
+    parse_window,
+)
 from motion_transfer.render.source_pictures import first_picture
 
 CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's
-SHOWN_AS_IS = ("renderer", "background", "person", "driver_person")
+SCENE = tuple(entry.name for entry in list_options(SceneOptions) if entry.name != "partners")
+SHOWN_AS_IS = ("renderer", *SCENE, "person", "driver_person")
 CHANGEABLE = (*SHOWN_AS_IS, "window", "frames", "frame_rate")
 SHARP_VIEWS = ("iuv", "texture", "map", "features")
 """Edges in them mean something: they are sent without loss."""
@@ -79,6 +89,7 @@ class Session:
         self._known = list(options.sources)
         self._numbers = list(range(len(self._known)))
         self._named: set[Path] = set()
+        self._backgrounds = [str(path)] if (path := options.background_file) else []
         self._source_work: dict[str, Any] | None = None
         self._inputs = Inputs()
         self._notices: list[str] = []
@@ -101,7 +112,7 @@ class Session:
         self._opener.join()
         self._folder.cleanup()
         # the command that the page shows, and that somebody has copied, names the present ones
-        self.dropped.clean(self._named | set(photo_files(self.options)))
+        self.dropped.clean(self._named | set(_named_files(self.options)))
 
     @property
     def error(self) -> str | None:
@@ -120,7 +131,8 @@ class Session:
     def key(self) -> str:
         """A digest of what pictures of frames depend on: it changes whenever one of them would."""
         o, plans = self.options, self.plans
-        drawn = (o.renderer, o.background, o.sources, o.person, o.driver_person)
+        scene = [getattr(o, name) for name in SCENE]
+        drawn = (o.renderer, scene, o.sources, o.person, o.driver_person)
         planned = plans and (plans.shots, plans.exact, plans.chosen)
         return hashlib.sha256(repr((drawn, planned)).encode()).hexdigest()[:12]
 
@@ -137,7 +149,7 @@ class Session:
         if draft:
             options = draft_of(options)
         calls: dict[str, Callable[[], np.ndarray]] = {
-            "result": lambda: self.views.result(options, driver, plans, index),
+            "result": lambda: show_alpha(self.views.result(options, driver, plans, index)),
             "iuv": lambda: self.views.iuv(driver, index),
             "features": lambda: self.views.feature_image(options, driver, plans, index),
             "pictures": lambda: self._proxy(index),
@@ -241,6 +253,8 @@ class Session:
             row = RENDERERS.get(parsed["renderer"])  # an unknown one is refused with the others
             parsed["weights"] = self._weights if row and row.default_weights else None
         changed = replace(self.options, **parsed)
+        if "background" in words:
+            self._check_background(changed)
         if self.driver is not None and self.driver.opened.pictures and "driver_person" in words:
             raise InputError(
                 "whom to follow in raw pictures is decided when they are read; start again with"
@@ -258,6 +272,41 @@ class Session:
                 self.source = source
                 self._errors.pop("source", None)
         self._touch()
+
+    def _check_background(self, options: RenderOptions) -> None:
+        """Raise InputError for a background that cannot be shown; know a new one."""
+        pictures = self.driver is None or self.driver.opened.pictures is not None
+        if options.background == "driver" and not pictures:
+            raise InputError(no_pictures(options.driver))
+        if (path := options.background_file) is not None:
+            open_background(path)
+            self.know_background(path)
+
+    def know_background(self, path: Path) -> str:
+        """Take a file as a background that can be chosen; returns how it is called as an option."""
+        with self._lock:
+            if str(path) not in self._backgrounds:
+                self._backgrounds.append(str(path))
+        return str(path)
+
+    def ask_background(self, number: int) -> Future[bytes]:
+        """Ask for a small picture of a background that can be chosen, see `ask_frame`."""
+        backgrounds = self.backgrounds()
+        if not 0 <= number < len(backgrounds):
+            raise InputError(f"there is no background {number}")
+        options = replace(self.options, background=backgrounds[number])
+        leads = self._numbers[0]
+        return self._ask(
+            ("background", options.background, leads, options.person),
+            lambda: draw_thumb(options, self.source),
+            "background",
+        )
+
+    def backgrounds(self) -> list[str]:
+        """List the backgrounds that can be chosen; colours can be any."""
+        pictures = self.driver is not None and self.driver.opened.pictures is not None
+        words = ["white", "black", *(w for w in SCENES if w != "driver" or pictures)]
+        return [*words, *self._backgrounds]
 
     def know_source(self, path: Path) -> int:
         """Take a dropped file as one that can be chosen; returns its number."""
@@ -329,7 +378,7 @@ class Session:
         """Begin the real run. Raises: OutputError if its output is in the way."""
         options = replace(self.options, force=self.options.force or replace_output)
         check_destination(options.output, force=options.force)
-        self._named.update(photo_files(options))  # a stopped run goes on from them
+        self._named.update(_named_files(options))  # a stopped run goes on from them
         if not self.rendering.begin(options):
             raise InputError("a run is under way; stop it, or wait until it is done")
 
@@ -344,7 +393,7 @@ class Session:
             written = folder / self.job_file.name
             written.write_text(text, encoding="utf-8")
             publish(written, self.job_file)
-        self._named.update(photo_files(self.options))
+        self._named.update(_named_files(self.options))
         return text
 
     def state(self) -> dict[str, Any]:
@@ -371,6 +420,9 @@ class Session:
                     "person": _whom(self.source_people, options.person),
                     "driver_person": _whom(in_driver, options.driver_person),
                 },
+                "backgrounds": [
+                    {"value": value, "name": Path(value).name} for value in self.backgrounds()
+                ],
                 "sources": [
                     {"number": number, "name": self._known[number][0].name}
                     for number in self._numbers
@@ -509,3 +561,9 @@ def _name_some(names: list[str]) -> str:
 def _whom(count: int, current: str) -> list[str]:
     """List whom one can choose: the largest, each of some people, and the present choice."""
     return list(dict.fromkeys(["largest", *map(str, range(count)), current]))
+
+
+def _named_files(options: RenderOptions) -> list[Path]:
+    """List what options name of the files that may have been dropped."""
+    behind = options.background_file
+    return [*photo_files(options), *([behind] if behind else [])]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -11,7 +10,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from motion_transfer.drawing.canvas import Canvas, Frame, colour_iuv
+from motion_transfer.drawing.backgrounds import Frame
+from motion_transfer.drawing.canvas import Picture, colour_iuv
 from motion_transfer.drawing.person import find_people
 from motion_transfer.drawing.renderers.interface import Recipe, Renderer
 from motion_transfer.drawing.source import Source
@@ -23,7 +23,8 @@ from motion_transfer.media.pictures.photo import encode_jpeg, read_photo, write_
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.option import part_of
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
-from motion_transfer.render.composition import make_canvas, open_recipe
+from motion_transfer.preview.scenes import Scenes
+from motion_transfer.render.composition import open_recipe
 from motion_transfer.render.driver import open_driver
 from motion_transfer.render.options import RendererOptions, RenderOptions, SourceOptions
 from motion_transfer.render.source import read_source
@@ -43,7 +44,7 @@ class Views:
         self._open_recipe = lru_cache(KEPT)(open_recipe)
         self._read_source = lru_cache(KEPT)(partial(read_source, listener=listener))
         self._prepare = lru_cache(KEPT)(self._prepare_source)
-        self._canvas = lru_cache(KEPT)(self._make_canvas)
+        self._scenes = Scenes(self.source, lambda options: self.prepared(options)[1])
 
     def source(self, options: RenderOptions) -> Source:
         """Give the source. Raises: InputError, as a run would."""
@@ -61,19 +62,12 @@ class Views:
 
     def result(
         self, options: RenderOptions, driver: PreviewedDriver, plans: FramePlans, index: int
-    ) -> Frame:
-        """Draw an output frame. Raises: InputError, WeightsError."""
-        iuv = plans.read(index, driver)
-        canvas = self.canvas(options, driver, plans)
-        return canvas.draw(self.prepared(options)[1], iuv, plans.window_at(index))
+    ) -> Picture:
+        """Draw an output frame, with alpha where nothing is behind.
 
-    def canvas(self, options: RenderOptions, driver: PreviewedDriver, plans: FramePlans) -> Canvas:
-        """Give an empty output, without the comparison's other panels."""
-        # the options that can be changed and leave it as it is
-        same = {"driver_person": "largest", "window": "auto", "frames": (None, None)}
-        plain = replace(options, compare=False, frame_rate=None, **same)
-        size = self.prepared(options)[1].working_size(plans.largest_side)
-        return self._canvas(plain, driver.opened.reader.height, driver.opened.reader.width, size)
+        Raises: InputError, WeightsError.
+        """
+        return self._scenes.frame(options, driver, plans, index)
 
     def iuv(self, driver: PreviewedDriver, index: int) -> Frame:
         """Colour a driver's frame by part, as DensePose does, everybody in it included."""
@@ -122,9 +116,6 @@ class Views:
     ) -> tuple[np.ndarray, Renderer]:
         appearance = recipe.appearance_of(self._read_source(options, recipe.texture_size))
         return appearance, recipe.renderer(appearance)
-
-    def _make_canvas(self, options: RenderOptions, height: int, width: int, size: int) -> Canvas:
-        return make_canvas(options, height, width, size, self.source(options))
 
 
 def write_frame(options: RenderOptions, index: int, output: Path) -> None:

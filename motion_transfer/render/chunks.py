@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
     from motion_transfer.drawing.renderers.interface import Renderer
     from motion_transfer.media.iuv.stream import IuvReader
+    from motion_transfer.render.backdrop import OpenBackdrop
     from motion_transfer.render.composition import Prepared
     from motion_transfer.render.driver import DriverFile
-    from motion_transfer.render.plan import Chunk
+    from motion_transfer.render.plan import Chunk, FrameReader
 
 KEPT_FRAMES_BYTES = 256 << 20
 """A worker keeps the decoded frames of its last chunk, for the next source with that driver."""
@@ -32,7 +33,7 @@ def render(
     name: str,
     prepared: Fetch,
     source_name: str,
-    appearance: Fetch,
+    appearances: Fetch,
     folder: Path,
     output: Path,
     chunks: Sequence[tuple[int, Path, str]],
@@ -42,7 +43,7 @@ def render(
     """Render chunks to finished segments.
 
     Args:
-        name, source_name: Tell the prepared run and the appearance from others that are kept warm.
+        name, source_name: Tell the prepared run and the appearances from others that are kept warm.
         output: What they are for, for messages.
         chunks: Index, a temporary path, and the segment's name in `folder`.
         keep_frames: Whether the next call may want the same driver's frames.
@@ -55,11 +56,17 @@ def render(
     from motion_transfer.render.engine import ContactSheet, Engine
 
     run: Prepared = WARM.get(f"run {name}", lambda: pickle.loads(prepared()))
-    renderer: Renderer = WARM.get(
-        f"renderer {source_name} {run.recipe}",
-        lambda: run.recipe.renderer(pickle.loads(appearance())),
+    renderers: list[Renderer] = WARM.get(
+        f"renderers {source_name} {run.recipe}",
+        lambda: [run.recipe.renderer(each) for each in pickle.loads(appearances())],
     )
-    reader = WARM.get(f"reader {run.driver}", run.driver.open)
+    backdrop: OpenBackdrop = WARM.get(f"backdrop {name}", run.backdrop.open)
+    files = dict.fromkeys(actor.driver for actor in run.actors)
+    readers: dict[DriverFile, FrameReader] = {
+        file: WARM.get(f"reader {file}", file.open) for file in files
+    }
+    if keep_frames and len(files) == 1:
+        readers = {file: _SharedFrames(readers[file], file) for file in files}  # type: ignore
     digests: list[tuple[int, str]] = []
     pieces = {index: folder / piece for index, _, piece in chunks}
 
@@ -68,8 +75,9 @@ def render(
 
     engine = Engine(
         run,
-        reader=_SharedFrames(reader, run.driver) if keep_frames else reader,
-        renderer=renderer,
+        readers=[readers[actor.driver] for actor in run.actors],
+        renderers=renderers,
+        backdrop=backdrop,
         sheet=ContactSheet(folder, len(run.plan.frames)) if with_sheet else None,
     )
     with explain_disk_errors(output):

@@ -9,21 +9,37 @@ preview again and again as options change, and evaluation the drawing ones alone
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from motion_transfer.drawing.canvas import Canvas, Comparison, make_background
+import numpy as np
+
+from motion_transfer.drawing.backgrounds import Frame, blur_picture, make_background
+from motion_transfer.drawing.canvas import Canvas, Comparison, Spot
+from motion_transfer.drawing.light import Light, match_light, measure_light
+from motion_transfer.drawing.person import occupancy
 from motion_transfer.drawing.renderers import RENDERERS
 from motion_transfer.drawing.renderers.interface import Appearance, Recipe
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import Window
-from motion_transfer.errors import OutputError
+from motion_transfer.errors import InputError, OutputError
 from motion_transfer.events import Listener, Notice
+from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.output.audio import AudioCut, choose_audio
 from motion_transfer.media.output.formats import OutputFormat, choose_format
 from motion_transfer.media.unchanged import Inputs
+from motion_transfer.render.backdrop import (
+    Backdrop,
+    Clip,
+    Still,
+    count_until_end,
+    empty_driver,
+    light_of,
+    open_background,
+    open_still,
+)
 from motion_transfer.render.content import chunk_key, run_key
 from motion_transfer.render.crew import Crew
 from motion_transfer.render.driver import DriverFile, DriverScan, scan_driver
@@ -33,10 +49,27 @@ from motion_transfer.render.options import (
     OutputOptions,
     RendererOptions,
     RenderOptions,
+    SceneOptions,
     parse_window,
 )
+from motion_transfer.render.placing import place_people
 from motion_transfer.render.plan import DriverPlan, plan_path
 from motion_transfer.render.source import check_photos, read_source
+
+
+@dataclass(frozen=True)
+class Actor:
+    """One person of a scene, on the way through the driver.
+
+    Attributes:
+        spots: Where the person is in each output frame.
+        table: Changes the light of what is drawn, see `match_light`.
+    """
+
+    driver: DriverFile
+    plan: DriverPlan
+    spots: tuple[Spot, ...]
+    table: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -44,18 +77,31 @@ class Prepared:
     """A run that can be rendered chunk by chunk, in any process.
 
     Attributes:
+        actors: Everybody who is drawn; the first one leads.
+        crops: Whether the output is the square that was drawn, and no frame of the driver.
         chunk_keys: Of the content that each chunk is made from.
         inputs: All files that it is made from.
     """
 
-    driver: DriverFile
-    plan: DriverPlan
+    actors: tuple[Actor, ...]
+    crops: bool
     recipe: Recipe
     canvas: Canvas
+    backdrop: Backdrop
     output_format: OutputFormat
     audio: AudioCut | None
     chunk_keys: tuple[str, ...]
     inputs: Inputs
+
+    @property
+    def plan(self) -> DriverPlan:
+        """The plan of who leads, which cuts the chunks."""
+        return self.actors[0].plan
+
+    def open_people(self) -> list[IuvReader]:
+        """Open the IUV of each actor, once for those who share it. Raises: InputError."""
+        readers = {actor.driver: actor.driver.open() for actor in self.actors}
+        return [readers[actor.driver] for actor in self.actors]
 
 
 @dataclass(frozen=True)
@@ -63,11 +109,11 @@ class Composed:
     """All that comes before the first frame.
 
     Attributes:
-        appearance: What the recipe's renderer knows of the source.
+        appearances: What the recipe's renderer knows of each actor's source.
     """
 
     prepared: Prepared
-    appearance: Appearance
+    appearances: tuple[Appearance, ...]
 
 
 def compose(
@@ -86,25 +132,89 @@ def compose(
         crew: Processes that help to look through it.
     Raises: InputError and its kinds.
     """
-    read_format(options)  # now, as the photos: to find a driver's people may take long
-    check_photos(options)
+    check_early(options)
     with ThreadPoolExecutor(2) as beside:  # what can be made ready is, while files are read
         ready = [] if options.adapt else [beside.submit(open_recipe(options).make_ready, ())]
-        scan = scan_driver(options, folder, listener, workers=options.worker_count, crew=crew)
-        scanned(scan)
-        plan = plan_run(options, scan)
+        scans = scan_cast(options, folder, listener, scanned=scanned, crew=crew)
+        plans = plan_cast(options, scans)
         options = settle_weights(options, listener)
-        inputs = Inputs(appearance_files(options))
+        inputs = Inputs(cast_files(options))
         recipe = open_recipe(options)
-        sides = [shot.window.side for shot in plan.shots]
+        sides = [shot.window.side for plan in plans for shot in plan.shots]
         ready.append(beside.submit(recipe.make_ready, sides))
-        source = read_source(options, recipe.texture_size, listener)
+        sources = read_cast(options, recipe, listener)
         for each in ready:
             each.result()
-    for note in source.notes:
+    for note in dict.fromkeys(note for source in sources for note in source.notes):
         listener(Notice(note))
-    prepared = prepare_run(options, scan, plan, recipe, source, inputs, listener)
-    return Composed(prepared, recipe.appearance_of(source))
+    prepared = prepare_run(options, scans, plans, recipe, sources, inputs, folder, listener)
+    return Composed(prepared, tuple(recipe.appearance_of(source) for source in sources))
+
+
+def check_early(options: RenderOptions) -> None:
+    """Refuse what can be refused at once: to find people may take long. Raises: InputError."""
+    read_format(options)
+    for member in options.cast:
+        check_photos(member)
+    if options.background_file is not None:
+        open_background(options.background_file)
+
+
+def scan_cast(
+    options: RenderOptions,
+    folder: Path,
+    listener: Listener,
+    *,
+    scanned: Callable[[DriverScan], object] = lambda _scan: None,
+    workers: int | None = None,
+    crew: Crew | None = None,
+) -> list[DriverScan]:
+    """Look through the driver for each of the cast, see `scan_driver`.
+
+    IUV shows everybody at once, and is looked through once.
+    """
+    scans: list[DriverScan] = []
+    for member in options.cast:
+        if scans and scans[0].pictures is None:
+            scans.append(scans[0])
+            continue
+        workers = workers or options.worker_count
+        scans.append(scan_driver(member, folder, listener, workers=workers, crew=crew))
+        scanned(scans[-1])
+    return scans
+
+
+def plan_cast(options: RenderOptions, scans: Sequence[DriverScan]) -> list[DriverPlan]:
+    """Plan the way of each of the cast, see `plan_run`. Raises: InputError, also for two of one."""
+    plans = [plan_run(*each) for each in zip(options.cast, scans, strict=True)]
+    for number, plan in enumerate(plans[1:], 1):
+        for earlier, other in enumerate(plans[:number]):
+            if all(
+                mine.person == its.person
+                for mine, its in zip(plan.frames, other.frames, strict=True)
+            ):
+                who = "who leads" if earlier == 0 else str(options.partners[earlier - 1].photo)
+                raise InputError(
+                    f"partner {options.partners[number - 1].photo} and {who} follow the same person"
+                    f" of {options.driver}; name another by --partner-person or --driver-person"
+                )
+    return plans
+
+
+def read_cast(options: RenderOptions, recipe: Recipe, listener: Listener) -> list[Source]:
+    """Read the source of each of the cast, see `read_source`."""
+    return [read_source(member, recipe.texture_size, listener) for member in options.cast]
+
+
+def cast_files(options: RenderOptions) -> Iterator[Path]:
+    """List what the appearance of each of the cast is made from, and what is behind them.
+
+    Raises: WeightsError if weights are missing.
+    """
+    for member in options.cast:
+        yield from appearance_files(member)
+    if options.background_file is not None:
+        yield options.background_file
 
 
 def settle_weights(options: RenderOptions, listener: Listener) -> RenderOptions:
@@ -122,7 +232,17 @@ def settle_weights(options: RenderOptions, listener: Listener) -> RenderOptions:
 
 def read_format(options: OutputOptions) -> OutputFormat:
     """Tell the format that the options mean. Raises: OutputError if it cannot be written."""
-    return choose_format(options.output, codec=options.codec, crf=options.crf)
+    transparent = isinstance(options, SceneOptions) and options.transparent
+    if transparent and options.compare:
+        raise OutputError("--compare shows panels, and they are not transparent; leave one out")
+    return choose_format(
+        options.output,
+        codec=options.codec,
+        crf=options.crf,
+        transparent=transparent,
+        alpha=options.alpha,
+        pix_fmt=options.pix_fmt,
+    )
 
 
 def open_recipe(options: RendererOptions) -> Recipe:
@@ -136,10 +256,14 @@ def open_recipe(options: RendererOptions) -> Recipe:
 def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
     """Decide whom to follow and where the window lies. Raises: InputError if nobody is there."""
     window = parse_window(options.window)
+    rate = options.frame_rate or scan.frame_rate or DEFAULT_RATE
+    count = count_until_end(options, rate)
+    if count is not None and count < len(scan.chosen):
+        scan = replace(scan, chosen=scan.chosen[:count], seen=scan.seen[:count])
     return plan_path(
         scan.seen,
         chosen=scan.chosen,
-        frame_rate=options.frame_rate or scan.frame_rate or DEFAULT_RATE,
+        frame_rate=rate,
         person=None if scan.pictures else options.driver_person,
         where=str(scan.path),
         where_first=scan.where_first,
@@ -152,34 +276,41 @@ def plan_run(options: RenderOptions, scan: DriverScan) -> DriverPlan:
 
 def prepare_run(
     options: RenderOptions,
-    scan: DriverScan,
-    plan: DriverPlan,
+    scans: Sequence[DriverScan],
+    plans: Sequence[DriverPlan],
     recipe: Recipe,
-    source: Source,
+    sources: Sequence[Source],
     inputs: Inputs,
+    folder: Path,
     listener: Listener,
 ) -> Prepared:
     """Put the parts together; the network is loaded.
 
     Args:
-        inputs: What recipe and source were read from.
+        scans, plans, sources: One for each of the cast.
+        inputs: What recipe and sources were read from.
+        folder: Where what is found in the driver's pictures is kept.
     Raises: InputError and its kinds, also if an input has changed since it was noted: chunks are
         keyed by what the files hold now; OutputError for an output that cannot hold the run.
     """
-    inputs |= scan.inputs | Inputs(audio_files(options))
+    scan, plan, source = scans[0], plans[0], sources[0]
+    inputs |= Inputs(audio_files(options))
+    for each in scans:
+        inputs |= each.inputs
     output_format = read_format(options)
     _check_length(options, output_format, plan)
-    recipe.make_ready([shot.window.side for shot in plan.shots])
+    recipe.make_ready([shot.window.side for plan in plans for shot in plan.shots])
+    working_size = recipe.working_size(plan.largest_side)
+    canvas = make_canvas(options, scan.height, scan.width, working_size, source)
+    _check_size(options, output_format, canvas)
+    backdrop = open_backdrop(options, scans, plan, canvas, source, folder, listener)
     key = run_key(
         options,
         recipe=recipe,
         output_format=output_format,
-        plan=plan,
+        plans=plans,
         in_place=is_in_place(options, source),
     )
-    working_size = recipe.working_size(plan.largest_side)
-    canvas = make_canvas(options, scan.height, scan.width, working_size, source)
-    _check_size(options, output_format, canvas)
     audio = choose_audio(
         options.audio,
         options.output,
@@ -192,17 +323,83 @@ def prepare_run(
     for note in audio.notes if audio else ():
         listener(Notice(note))
     prepared = Prepared(
-        driver=scan.file,
-        plan=plan,
+        actors=make_actors(options, scans, plans, sources, canvas, backdrop),
+        crops=options.size == "crop",
         recipe=recipe,
         canvas=canvas,
+        backdrop=backdrop,
         output_format=output_format,
         audio=audio,
-        chunk_keys=tuple(chunk_key(key, plan, chunk) for chunk in plan.chunks),
+        chunk_keys=tuple(chunk_key(key, plans, chunk) for chunk in plan.chunks),
         inputs=inputs,
     )
     inputs.check()
     return prepared
+
+
+def open_backdrop(
+    options: RenderOptions,
+    scans: Sequence[DriverScan],
+    plan: DriverPlan,
+    canvas: Canvas,
+    source: Source,
+    folder: Path,
+    listener: Listener,
+) -> Backdrop:
+    """Make what is behind, see `prepare_run`. Raises: InputError."""
+    size = canvas.height, canvas.width
+    if options.background == "driver":
+        return empty_driver(options, scans, plan, size, folder, listener)
+    path = options.background_file
+    picture = make_still(options, size, source)
+    if path is None or picture is not None:
+        return Still(picture)
+    fit, end, blur = options.background_fit, options.background_end, options.background_blur
+    return Clip(path, size, plan.frame_rate, fit, end, blur)
+
+
+def make_still(options: RenderOptions, size: tuple[int, int], source: Source) -> Frame | None:
+    """Make a background that is one picture of (height, width).
+
+    Returns: None where nothing is behind, or pictures that move. Raises: InputError.
+    """
+    if options.background_file is not None:
+        return open_still(options, size)
+    if options.transparent or options.background == "driver":
+        return None
+    in_place = is_in_place(options, source)
+    picture = make_background(options.background, size, source, in_place=in_place)
+    return blur_picture(picture, options.background_blur)
+
+
+def make_actors(
+    options: RenderOptions,
+    scans: Sequence[DriverScan],
+    plans: Sequence[DriverPlan],
+    sources: Sequence[Source],
+    canvas: Canvas,
+    backdrop: Backdrop,
+) -> tuple[Actor, ...]:
+    """Place each of the cast in the output, and bring them to its light."""
+    size = canvas.height, canvas.width
+    if options.size == "crop":
+        # of the largest shot's window; others are enlarged to it
+        spots = [(Spot(Window(0, 0, canvas.height), canvas.height),) * len(plans[0].frames)]
+    else:
+        spots = place_people(plans, options, (scans[0].height, scans[0].width), size)
+    tables: list[np.ndarray | None] = [None] * len(plans)
+    if options.match_colours:
+        around = light_of(backdrop, len(plans[0].frames))
+        tables = [match_light(person_light(source), around) for source in sources]
+    return tuple(
+        Actor(scan.file, plan, own_spots, table)
+        for scan, plan, own_spots, table in zip(scans, plans, spots, tables, strict=True)
+    )
+
+
+def person_light(source: Source) -> Light:
+    """Measure the light of the person of a photo."""
+    return measure_light(source.photo.rgb, occupancy(source.iuv))
 
 
 def is_in_place(options: RenderOptions, source: Source) -> bool:
@@ -214,13 +411,19 @@ def is_in_place(options: RenderOptions, source: Source) -> bool:
 
 
 def frame_size(
-    options: OutputOptions, height: int, width: int, working_size: int
+    options: RenderOptions, height: int, width: int, working_size: int
 ) -> tuple[int, int]:
-    """Tell height and width, px, of an output frame without a comparison, see `make_canvas`."""
+    """Tell height and width, px, of an output frame without a comparison, see `make_canvas`.
+
+    Raises: InputError if the background, whose size it is, cannot be read.
+    """
     if options.size == "crop":
         return working_size, working_size
     if options.size == "even":
         return height + height % 2, width + width % 2
+    if options.size == "background" and options.background_file is not None:
+        behind = open_background(options.background_file)
+        return behind.height, behind.width
     return height, width
 
 
@@ -235,9 +438,7 @@ def make_canvas(
     """
     height, width = frame_size(options, height, width, working_size)
     comparison = Comparison(source, height, width) if options.compare else None
-    in_place = is_in_place(options, source)
-    background = make_background(options.background, (height, width), source, in_place=in_place)
-    return Canvas(background, crop=options.size == "crop", comparison=comparison)
+    return Canvas(height, width, options.transparent, options.shadow, comparison)
 
 
 def _check_length(options: OutputOptions, output_format: OutputFormat, plan: DriverPlan) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 import re
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,6 +38,7 @@ KEYED_ELSEWHERE = {
     *("frames", "frame_rate"),  # by the plan
     *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
     *("renderer", "engine", "precision", "device", "codec", "crf"),  # by the recipe and the format
+    *("partners", "background"),  # by the cast, and by the file's content
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio", "audio_track"),  # made when everything is drawn
 }
@@ -81,7 +83,7 @@ def run_key(
     *,
     recipe: Recipe,
     output_format: OutputFormat,
-    plan: DriverPlan,
+    plans: Sequence[DriverPlan],
     in_place: bool,
 ) -> str:
     """Compute the key of a run's frames, all but the driver's own.
@@ -95,26 +97,36 @@ def run_key(
     }
     return key_of(
         {
-            "source": source_key(options, recipe),
+            "sources": [source_key(member, recipe) for member in options.cast],
+            "background": _background_facts(options),
             "options": drawn,
             "in place": in_place,
             "thumbnails": options.sheet is not None,
             "renderer": [recipe.name, recipe.content, recipe.execution],
             "format": [asdict(output_format), options.output.suffix.lower()],
-            "shots": [asdict(shot) for shot in plan.shots],
-            "rate": plan.frame_rate,
+            "shots": [[asdict(shot) for shot in plan.shots] for plan in plans],
+            "rate": plans[0].frame_rate,
             "device": _device(recipe.device),
             "versions": [__version__, *(package_version(name) for name in LIBRARIES)],
         }
     )
 
 
-def chunk_key(run: str, plan: DriverPlan, chunk: Chunk) -> str:
+def chunk_key(run: str, plans: Sequence[DriverPlan], chunk: Chunk) -> str:
     """Compute the key of a chunk: its run, its driver frames, and who is followed in them."""
-    frames = plan.frames[chunk.start : chunk.stop]
-    return key_of(
-        {"run": run, "start": chunk.start, "frames": [[f.digest, str(f.person)] for f in frames]}
-    )
+    frames = [plan.frames[chunk.start : chunk.stop] for plan in plans]
+    followed = [[[f.digest, str(f.person)] for f in each] for each in frames]
+    return key_of({"run": run, "start": chunk.start, "frames": followed})
+
+
+def _background_facts(options: RenderOptions) -> str:
+    """Tell what is behind: a word, or what a file holds."""
+    path = options.background_file
+    if path is not None:
+        return digest_file(path, "background")
+    if options.background == "driver":  # its IUV, which the plan holds, is not all of it
+        return digest_file(options.driver, "driver")
+    return options.background
 
 
 def driver_key(options: InputOptions) -> str:

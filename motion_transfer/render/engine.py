@@ -11,6 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -20,7 +21,8 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from motion_transfer.drawing.canvas import Frame
+from motion_transfer.drawing.backgrounds import Frame
+from motion_transfer.drawing.canvas import Figure, Picture, Rgba, show_alpha
 from motion_transfer.drawing.engines.interface import LANES
 from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.renderers.interface import Renderer
@@ -29,7 +31,8 @@ from motion_transfer.errors import InputError, RenderError
 from motion_transfer.events import FramesDone, Listener, ignore
 from motion_transfer.media.output.segments import open_segment
 from motion_transfer.media.pictures.photo import read_photo, write_png
-from motion_transfer.render.composition import Prepared
+from motion_transfer.render.backdrop import OpenBackdrop
+from motion_transfer.render.composition import Actor, Prepared
 from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
 
 CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's batches are on the way
@@ -65,16 +68,20 @@ class Engine:
         self,
         prepared: Prepared,
         *,
-        reader: FrameReader,
-        renderer: Renderer,
+        readers: Sequence[FrameReader],
+        renderers: Sequence[Renderer],
+        backdrop: OpenBackdrop,
         sheet: ContactSheet | None = None,
         listener: Listener = ignore,
         helpers: Helpers | None = None,
     ) -> None:
+        """Take what was prepared; of readers and renderers there is one for each actor."""
         self._prepared = prepared
         self._plan = prepared.plan
-        self._reader = reader
-        self._renderer = renderer
+        self._roles = [
+            _Role(*each) for each in zip(prepared.actors, readers, renderers, strict=True)
+        ]
+        self._backdrop = backdrop
         self._sheet = sheet
         self._listener = listener
         self._helpers = helpers
@@ -95,7 +102,7 @@ class Engine:
         Raises: the first thread's error, after all threads have stopped; InputError if the run's
             inputs change meanwhile.
         """
-        drawers = {"core": threads, "device": LANES, "nothing": 0}[self._renderer.occupies]
+        drawers = {"core": threads, "device": LANES, "nothing": 0}[self._roles[0].renderer.occupies]
         with (
             one_torch_thread(),
             ThreadPoolExecutor(max(1, drawers), thread_name_prefix="draw") as draw,
@@ -135,88 +142,108 @@ class Engine:
             rate=self._plan.frame_rate,
             first=chunk.start,
         ) as write:
-            index = chunk.start
-            for frames in self._render_batches(chunk):
-                for frame in frames:
-                    write(frame)
-                    if self._sheet is not None:
-                        self._sheet.offer(index, frame)
-                    index += 1
-                self._listener(FramesDone(len(frames)))
+            for index, frame in enumerate(self._lay_out(chunk), chunk.start):
+                write(frame)
+                if self._sheet is not None:
+                    self._sheet.offer(index, frame)
+                self._listener(FramesDone(1))
         finished(chunk, path)
         self._prepared.inputs.glance()
 
-    def _render_batches(self, chunk: Chunk) -> Iterator[list[Frame]]:
-        """Make a chunk's output frames in batches, which begin where chunk or shot does."""
-        frames = self._read(chunk)
-        on_their_way: deque[Callable[[], list[Frame]]] = deque()
-        for shot in self._plan.shots_in(chunk):
-            size = self._renderer.batch_size(self._renderer.working_size(shot.window.side))
+    def _lay_out(self, chunk: Chunk) -> Iterator[Picture]:
+        """Make a chunk's output frames."""
+        canvas = self._prepared.canvas
+        drawn = zip(*(self._draw(role, chunk) for role in self._roles), strict=True)
+        behind = self._backdrop.read(chunk.start, chunk.stop)
+        for index, (background, figures) in enumerate(zip(behind, drawn, strict=True), chunk.start):
+            people = [
+                Figure(rgba, role.actor.spots[index], role.actor.table)
+                for role, (_, rgba) in zip(self._roles, figures, strict=True)
+            ]
+            yield canvas.lay_out(background, people, figures[0][0])
+
+    def _draw(self, role: _Role, chunk: Chunk) -> Iterator[tuple[Frame, Rgba]]:
+        """Draw an actor frame by frame; batches begin where chunk or shot does.
+
+        Returns: With each picture the IUV to compare it with: the driver's, or the square that was
+            drawn, where that is the output.
+        """
+        frames = self._read(role, chunk)
+        on_their_way: deque[Callable[[], list[tuple[Frame, Rgba]]]] = deque()
+        renderer = role.renderer
+        for shot in role.actor.plan.shots_in(chunk):
+            size = renderer.batch_size(renderer.working_size(shot.window.side))
             for start in range(shot.start, shot.stop, size):
                 count = min(size, shot.stop - start)
                 batch = list(islice(frames, count))
-                on_their_way.append(self._begin_batch(batch, start, shot.window))
+                on_their_way.append(self._begin_batch(role, batch, start, shot.window))
                 if len(on_their_way) > self._ahead:
-                    yield on_their_way.popleft()()
+                    yield from on_their_way.popleft()()
                 if self._stop.is_set():
                     raise StoppedError
         for finish in on_their_way:
-            yield finish()
+            yield from finish()
 
     def _begin_batch(
-        self, batch: list[Frame], start: int, window: Window
-    ) -> Callable[[], list[Frame]]:
+        self, role: _Role, batch: list[Frame], start: int, window: Window
+    ) -> Callable[[], list[tuple[Frame, Rgba]]]:
         """Have driver frames drawn, which make frames from `start` on; give what waits for it."""
-        size = self._renderer.working_size(window.side)
+        renderer = role.renderer
+        size = renderer.working_size(window.side)
         # padded to full batches: what one frame looks like must not depend on its neighbours
-        crops = np.zeros((self._renderer.batch_size(size), size, size, 3), np.uint8)
+        crops = np.zeros((renderer.batch_size(size), size, size, 3), np.uint8)
         for slot, iuv in enumerate(batch):
             crops[slot] = window.cut(iuv, size)
-        drawn = partial(self._renderer.render, crops)
+        drawn = partial(renderer.render, crops)
         if self._drawers is not None:
             drawn = self._drawers.submit(drawn).result
-        return partial(self._finish_batch, batch, start, window, crops, drawn)
+        shown = list(crops) if self._prepared.crops else batch
+        return partial(_finish_batch, role, shown[: len(batch)], start, drawn)
 
-    def _finish_batch(
-        self,
-        batch: list[Frame],
-        start: int,
-        window: Window,
-        crops: UInt8[np.ndarray, "B S S 3"],
-        drawn: Callable[[], Pixels],
-    ) -> list[Frame]:
-        """Wait for a batch and lay out its output frames."""
-        canvas = self._prepared.canvas
-        try:
-            results = drawn()
-        except RuntimeError as error:  # what torch raises, out of memory too
-            first = self._plan.first + start
-            raise RenderError(
-                f"the {self._renderer.name} renderer failed in the driver's frames {first} to"
-                f" {first + len(batch) - 1}: {error}"
-            ) from error
-        return [
-            canvas.lay_out(iuv, crop, rgba, window)
-            for iuv, crop, rgba in zip(batch, crops, results, strict=False)
-        ]
-
-    def _read(self, chunk: Chunk) -> Iterator[Frame]:
+    def _read(self, role: _Role, chunk: Chunk) -> Iterator[Frame]:
         """Read the IUV frames that the chunk shows, with only the followed person in them."""
-        first = self._plan.first
-        frames = self._reader.read(first + chunk.start, first + chunk.stop)
-        plans = self._plan.frames[chunk.start : chunk.stop]
+        reader, plan = role.reader, role.actor.plan
+        first = plan.first
+        frames = reader.read(first + chunk.start, first + chunk.stop)
+        entries = plan.frames[chunk.start : chunk.stop]
         shown_index, shown = -1, None
-        for index, (plan, iuv) in enumerate(zip(plans, frames, strict=True), first + chunk.start):
-            if plan.held is None:
+        for index, (entry, iuv) in enumerate(
+            zip(entries, frames, strict=True), first + chunk.start
+        ):
+            if entry.held is None:
                 shown_index, shown = index, iuv
-            elif plan.held != shown_index or shown is None:
-                shown_index, shown = plan.held, next(self._reader.read(plan.held, plan.held + 1))
-            if digest_of_iuv(shown) != plan.digest:
+            elif entry.held != shown_index or shown is None:
+                shown_index, shown = entry.held, next(reader.read(entry.held, entry.held + 1))
+            if digest_of_iuv(shown) != entry.digest:
                 raise InputError(
-                    f"{self._reader.stream.where(shown_index)} has changed since the run began;"
+                    f"{reader.stream.where(shown_index)} has changed since the run began;"
                     " start again when it is complete"
                 )
-            yield plan.isolate(shown)
+            yield entry.isolate(shown)
+
+
+@dataclass(frozen=True)
+class _Role:
+    """An actor, and what reads and draws for it."""
+
+    actor: Actor
+    reader: FrameReader
+    renderer: Renderer
+
+
+def _finish_batch(
+    role: _Role, shown: Sequence[Frame], start: int, drawn: Callable[[], Pixels]
+) -> list[tuple[Frame, Rgba]]:
+    """Wait for a batch."""
+    try:
+        results = drawn()
+    except RuntimeError as error:  # what torch raises, out of memory too
+        first = role.actor.plan.first + start
+        raise RenderError(
+            f"the {role.renderer.name} renderer failed in the driver's frames {first} to"
+            f" {first + len(shown) - 1}: {error}"
+        ) from error
+    return list(zip(shown, results, strict=False))
 
 
 class ContactSheet:
@@ -227,9 +254,10 @@ class ContactSheet:
         self._folder = folder
         self._wanted = {int(index) for index in np.linspace(0, frame_count - 1, count).round()}
 
-    def offer(self, index: int, frame: UInt8[np.ndarray, "H W 3"]) -> None:
+    def offer(self, index: int, frame: Picture) -> None:
         """Keep a frame if it is one of the wanted; in any order."""
         if index in self._wanted:
+            frame = show_alpha(frame)
             scale = min(1, THUMBNAIL_PX / max(frame.shape[:2]))
             size = (max(1, round(frame.shape[1] * scale)), max(1, round(frame.shape[0] * scale)))
             write_png(self._path(index), cv2.resize(frame, size, interpolation=cv2.INTER_AREA))

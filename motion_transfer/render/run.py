@@ -203,18 +203,18 @@ class _ChunkTasks:
         self._prepared = composed.prepared
         self._work = work
         self._crew = crew
-        blobs = {"run": composed.prepared, "appearance": composed.appearance}
+        blobs = {"run": composed.prepared, "appearances": composed.appearances}
         self._blobs = [
             crew.share(name, partial(pickle.dumps, blob, PICKLE_PROTOCOL))
             for name, blob in blobs.items()
         ]
 
     def begin(self, chunk: Chunk) -> Future[Any] | None:
-        run, appearance = self._blobs
+        run, appearances = self._blobs
         piece = piece_of(self._prepared, chunk)
         return self._crew.offer(
             render,
-            *("", run, "", appearance, self._work.path, self._options.output),
+            *("", run, "", appearances, self._work.path, self._options.output),
             [(chunk.index, self._work.temporary(piece), piece)],
             self._options.sheet is not None,
             False,
@@ -259,8 +259,9 @@ def _render(
         with explain_disk_errors(options.output):
             engine = Engine(
                 prepared,
-                reader=prepared.driver.open(),
-                renderer=prepared.recipe.renderer(composed.appearance),
+                readers=prepared.open_people(),
+                renderers=[prepared.recipe.renderer(each) for each in composed.appearances],
+                backdrop=prepared.backdrop.open(),
                 sheet=sheet,
                 listener=listener,
                 helpers=_ChunkTasks(options, composed, work, crew, note),

@@ -154,7 +154,10 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
         lambda s: ["--fps", "500", "-o", s.folder / "out.webm", "--codec", "av1"],
         "cannot encode 64 x 96 at 500 frames/s",
     ),
-    "background unknown": (["--background", "mauve"], "background 'mauve'"),
+    "background unknown": (
+        ["--background", "mauve"],
+        "background mauve does not exist; name a picture",
+    ),
     "size unknown": (["--size", "big"], "size is 'big'; supported are driver"),
     "missing unknown": (["--missing", "skip"], "missing is 'skip'"),
     "workers zero": (["--workers", "0"], "workers is 0"),

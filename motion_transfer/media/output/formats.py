@@ -91,7 +91,15 @@ class OutputFormat:
         return OUTPUT_KINDS[self.kind]
 
 
-def choose_format(output: Path, *, codec: str | None, crf: int | None) -> OutputFormat:
+def choose_format(
+    output: Path,
+    *,
+    codec: str | None,
+    crf: int | None,
+    transparent: bool = False,
+    alpha: str = "straight",
+    pix_fmt: str | None = None,
+) -> OutputFormat:
     """Choose the format that an output path and the options mean.
 
     Raises: OutputError for an unknown ending or codec, one that the container or the installed

@@ -7,9 +7,11 @@ its time, so that frames are repeated or left out and nothing drifts from the so
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
@@ -50,6 +52,10 @@ class Timing:
     start_seconds: Fraction
     constant: bool
 
+    def middle_seconds(self, index: int) -> Fraction:
+        """Tell the middle of the time at which an output frame is shown."""
+        return self.start_seconds + (index + Fraction(1, 2)) / self.rate
+
 
 class PictureStream(ABC):
     """RGB frames of one size.
@@ -73,6 +79,14 @@ class PictureStream(ABC):
     @abstractmethod
     def read(self) -> Iterator[Frame]:
         """Read every frame in order. Raises: InputError naming the frame that is broken."""
+
+    def play(self, start: int = 0) -> Iterator[Callable[[], Frame]]:
+        """Give each frame from `start` on as a call that makes it: who skips it pays little.
+
+        Raises: InputError naming the frame that is broken, also in the calls.
+        """
+        for picture in islice(self.read(), start, None):
+            yield partial(_itself, picture)
 
     def where(self, index: int) -> str:
         """Name the place of a frame, for messages."""
@@ -117,10 +131,15 @@ class PhotoStream(PictureStream):
         self.notes = first.notes
 
     def read(self) -> Iterator[Frame]:
-        for index, file in enumerate(self._files):
-            photo = read_photo(file, "picture")
-            self.notes = tuple(dict.fromkeys((*self.notes, *photo.notes)))  # may be read twice
-            yield self._check_size(photo.on_white(), index)
+        return (picture() for picture in self.play())
+
+    def play(self, start: int = 0) -> Iterator[Callable[[], Frame]]:
+        return (partial(self._read, index) for index in range(start, len(self._files)))
+
+    def _read(self, index: int) -> Frame:
+        photo = read_photo(self._files[index], "picture")
+        self.notes = tuple(dict.fromkeys((*self.notes, *photo.notes)))  # may be read twice
+        return self._check_size(photo.on_white(), index)
 
     def where(self, index: int) -> str:
         return f"frame {index}, {self._files[index]}" if self.path.is_dir() else str(self.path)
@@ -157,16 +176,20 @@ def plan_timing(
     return Timing(mean, max(1, round(length * mean)), start, constant=False)
 
 
-def show_steadily(frames: Iterable[tuple[Fraction, Shown]], timing: Timing) -> Iterator[Shown]:
+def show_steadily(
+    frames: Iterable[tuple[Fraction, Shown]], timing: Timing, start: int = 0
+) -> Iterator[Shown]:
     """Yield for each output frame the one that is on the screen in the middle of its time.
 
     Args:
-        frames: Pairs of when a frame is shown, in seconds, and the frame, in order.
+        frames: Pairs of when a frame is shown, in seconds, and the frame, in order; the first one
+            begins before the middle of the first output frame.
+        start: The first output frame.
     """
     frame_seconds = 1 / timing.rate
-    middle = timing.start_seconds + frame_seconds / 2
+    middle = timing.middle_seconds(start)
     shown: Shown | None = None
-    index = 0
+    index = start
     for begins, frame in frames:
         while index < timing.count and shown is not None and begins > middle:
             yield shown
@@ -175,3 +198,7 @@ def show_steadily(frames: Iterable[tuple[Fraction, Shown]], timing: Timing) -> I
     for _ in range(index, timing.count):
         if shown is not None:
             yield shown
+
+
+def _itself(frame: Frame) -> Frame:
+    return frame

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import cache, partial
 from pathlib import Path
 
 import av
@@ -98,17 +99,29 @@ class FilmedVideo(PictureStream):
         self.notes += notes
 
     def read(self) -> Iterator[Frame]:
+        return (picture() for picture in self.play())
+
+    def play(self, start: int = 0) -> Iterator[Callable[[], Frame]]:
         shown: av.VideoFrame | None = None
-        picture: Frame | None = None
-        index = 0
+        picture: Callable[[], Frame] | None = None
+        index = start
         with _opened(self.path, lambda reason: _damaged(self.where(index), reason)) as video:
-            for frame in show_steadily(self._decode(*video), self._timing):
+            if start and self._clocked:
+                self._seek(*video, start)
+            for frame in show_steadily(self._decode(*video), self._timing, start):
                 if picture is None or frame is not shown:  # repeated frames are converted once
-                    shown, picture = frame, self._shown(frame, index)
+                    shown, picture = frame, cache(partial(self._shown, frame, index))
                 yield picture
                 index += 1
         if shown is None:
-            raise InputError(f"video {self.path} holds no frames")
+            raise InputError(f"video {self.path} holds no frames from {start} on; export it again")
+
+    def _seek(self, container: InputContainer, stream: av.VideoStream, index: int) -> None:
+        """Go to the last key frame that is not shown after a frame."""
+        base = stream.time_base or Fraction(1)
+        # one more: what is interlaced is told by its neighbours
+        middle = self._timing.middle_seconds(max(0, index - 1))
+        container.seek(int(middle / base), stream=stream, backward=True)
 
     def _decode(
         self, container: InputContainer, stream: av.VideoStream

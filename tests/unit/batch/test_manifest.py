@@ -228,7 +228,7 @@ def test_settings_are_checked(tmp_path: Path) -> None:
         "--set siez=crop: unknown field; did you mean size? allowed are output_root, "
     )
     assert refusal(path, "size=huge").startswith(
-        "--set size=huge: Input should be 'driver', 'crop' or 'even'"
+        "--set size=huge: Input should be 'driver', 'crop', 'even' or 'background'"
     )
     assert refusal(path, "crf=low").splitlines() == [
         "--set crf=low: Input should be a valid integer, unable to parse string as an integer"

@@ -62,9 +62,9 @@ def test_every_command_has_help(mt, command: str) -> None:
 def test_help_of_run_has_sections_in_order(mt) -> None:
     lines = mt("run", "--help").out.splitlines()
     headings = [line for line in lines if line.endswith(":") and not line.startswith(" ")]
-    assert headings[:6] == [
+    assert headings[:7] == [
         *("Source:", "Driver:", "Raw pictures:"),
-        *("Garment transfer:", "Rendering:", "Output:"),
+        *("Garment transfer:", "Rendering:", "Scene:", "Output:"),
     ]
 
 
@@ -96,8 +96,8 @@ def test_public_names() -> None:
     import motion_transfer
 
     assert sorted(motion_transfer.__all__) == [
-        *("Garment", "MotionTransferError", "RenderOptions", "RenderReport", "__version__"),
-        "render_video",
+        *("Garment", "MotionTransferError", "Partner", "RenderOptions", "RenderReport"),
+        *("__version__", "render_video"),
     ]
     for name in motion_transfer.__all__:
         assert getattr(motion_transfer, name) is not None

@@ -10,10 +10,11 @@ import pytest
 
 from motion_transfer.batch.expand import expand
 from motion_transfer.batch.manifest import read_manifest
-from motion_transfer.cli.run import pair_garments, run
+from motion_transfer.cli.options import pair_words
+from motion_transfer.cli.run import run
 from motion_transfer.option import options_from_words
 from motion_transfer.preview.export import command_line, manifest_text
-from motion_transfer.render.options import Garment, RenderOptions
+from motion_transfer.render.options import Garment, Partner, RenderOptions
 
 CHANGES = [
     {},
@@ -24,6 +25,14 @@ CHANGES = [
     {"device": "cpu", "size": "crop", "audio": Path("none"), "weights": Path("lite")},
     {"source_iuv": (Path("in/a b_IUV.png"),), "source_iuv_order": "vui", "missing": "hold"},
     {"source": (Path("in/front.png"), Path("in/me turning.mp4"))},
+    {"background": "in/street at night.mp4", "size": "background", "background_blur": 1.5},
+    {"background": "transparent", "place": "0.5,0.9,1.5", "on_the_spot": True, "shadow": True},
+    {
+        "partners": (
+            Partner(photo=Path("in/bob.png"), person="1"),
+            Partner(photo=Path("in/eve.png"), person="0,1,20,30", iuv=Path("in/eve_x.png")),
+        )
+    },
     {"sheet": Path("out/sheet.png"), "estimator": "densepose", "estimator_model": Path("m.onnx")},
     {
         "garments": (
@@ -49,9 +58,11 @@ def test_the_command_line_means_the_same(changes: dict) -> None:
     words = shlex.split(command_line(written))
     assert words[:2] == ["mt", "run"]
     read = run.make_context("run", words[2:]).params
-    garments = pair_garments(read.pop("garments"), read.pop("garment_parts"))
+    garments = pair_words(read.pop("garments"), read.pop("garment_parts"), "garment", "parts")
+    partners = pair_words(read.pop("partners"), read.pop("partner_person"), "partner", "person")
     del read["quiet"], read["as_json"]
-    assert options_from_words(RenderOptions, {**read, "garments": garments}) == written
+    read |= {"garments": garments, "partners": partners}
+    assert options_from_words(RenderOptions, read) == written
 
 
 @pytest.mark.parametrize("changes", CHANGES)
@@ -97,4 +108,9 @@ def _absolute(options: RenderOptions) -> dict:
     words["garments"] = [
         (g.photo.absolute(), g.iuv and g.iuv.absolute(), g.parts) for g in options.garments
     ]
+    words["partners"] = [
+        (p.photo.absolute(), p.iuv and p.iuv.absolute(), p.person) for p in options.partners
+    ]
+    if (behind := options.background_file) is not None:
+        words["background"] = str(behind.absolute())
     return words

@@ -230,7 +230,7 @@ def test_an_option_changes_the_pictures_and_their_key(options: RenderOptions, op
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        ({"background": "mauve"}, "background 'mauve'"),
+        ({"background": "mauve"}, "background mauve does not exist"),
         ({"renderer": "gan"}, "renderer is 'gan'"),
         ({"person": "4"}, "person"),
         ({"driver_person": "4"}, "person"),

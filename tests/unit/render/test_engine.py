@@ -73,9 +73,18 @@ def prepared(studio) -> Prepared:
         return prepare(options, work, ignore).prepared
 
 
+def engine_of(prepared: Prepared, renderer: Slow) -> Engine:
+    return Engine(
+        prepared,
+        readers=prepared.open_people(),
+        renderers=[renderer],
+        backdrop=prepared.backdrop.open(),
+    )
+
+
 def rendered(prepared: Prepared, renderer: Slow, folder: Path, **settings: Any) -> list[bytes]:
     folder.mkdir()
-    engine = Engine(prepared, reader=prepared.driver.open(), renderer=renderer)
+    engine = engine_of(prepared, renderer)
     chunks = [(chunk, folder / f"{chunk.index}.nut") for chunk in prepared.plan.chunks]
     engine.render(chunks, finished=lambda _chunk, _path: None, **settings)
     return [path.read_bytes() for _, path in chunks]
@@ -95,7 +104,7 @@ def test_the_bytes_do_not_know_who_drew(tmp_path: Path, prepared: Prepared) -> N
 
 def test_one_chunk_alone_keeps_all_threads_busy(tmp_path: Path, prepared: Prepared) -> None:
     renderer = Slow("core")
-    engine = Engine(prepared, reader=prepared.driver.open(), renderer=renderer)
+    engine = engine_of(prepared, renderer)
     chunk = prepared.plan.chunks[0]
     engine.render([(chunk, tmp_path / "only.nut")], 4, lambda _chunk, _path: None)
     assert renderer.most == 4

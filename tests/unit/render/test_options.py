@@ -104,7 +104,13 @@ def options(**changes) -> RenderOptions:
         ({"size": "huge"}, "size is 'huge'; supported are driver, crop, even"),
         ({"renderer": "texture", "weights": Path("w")}, "uses no weights"),
         ({"workers": 0}, "workers is 0"),
-        ({"background": "mauve"}, "background 'mauve'"),
+        ({"background": "#mauve"}, "background '#mauve'; write a colour as #rrggbb, white, black"),
+        ({"background_blur": 101.0}, "background blur 101.0"),
+        ({"place": "0.5,0.9"}, "place '0.5,0.9'; write X,Y,SCALE"),
+        ({"place": "0.5,0.9,0"}, "place '0.5,0.9,0'; write X,Y,SCALE"),
+        ({"size": "background"}, "--size background takes its size from a picture"),
+        ({"size": "crop", "place": "0.5,0.9,1"}, "--size crop is the square around one person"),
+        ({"background": "transparent", "match_colours": True}, "--match-colours goes by what is"),
     ],
 )
 def test_bad_options(changes: dict, reason: str) -> None:

@@ -1,20 +1,12 @@
-"""What one run is: a source, a driver, an output, and how to get from one to the other.
-
-Every option is described once, here. A function that reads some of them takes the part that it
-reads: `RenderOptions` is each of its parts.
-"""
+"""What goes into a run: who is drawn, in whose clothes, and whose motion it is."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
 
-from motion_transfer.drawing.engines import ANYTHING, ENGINES, PRECISIONS, Wish, check_device
-from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS, RendererRow
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.opening import ESTIMATORS, check_estimator
 from motion_transfer.media.iuv.formats import (
@@ -26,27 +18,12 @@ from motion_transfer.media.iuv.formats import (
     Missing,
     driver_help,
 )
-from motion_transfer.option import (
-    LONGEST_SHOWN,
-    REQUIRED,
-    check_choices,
-    option,
-    parse_colour,
-    read_whole,
-)
+from motion_transfer.option import LONGEST_SHOWN, REQUIRED, option, read_whole
+from motion_transfer.render.options.part import Part
 
-NO_AUDIO = "none"
-SIZES = ("driver", "crop", "even")
 KEPT_SUFFIX = ".mtsource"
 SMALLEST_WINDOW, LARGEST_WINDOW = 16, 16384
 """Sides, px: a smaller window shows nobody, a larger one takes the memory of a whole machine."""
-
-DEFAULT_RATE = Fraction(30)
-
-
-def _described(row: RendererRow) -> str:
-    default = "; default" if row.name == DEFAULT_RENDERER else ""
-    return f"{row.name} ({row.summary}{default})"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,15 +35,8 @@ class Garment:
     iuv: Path | None = None
 
 
-class _Part:
-    """Some options; checked when they are made."""
-
-    def __post_init__(self) -> None:
-        check_choices(self)
-
-
 @dataclass(frozen=True, kw_only=True)
-class EstimatorOptions(_Part):
+class EstimatorOptions(Part):
     """Who finds the people of pictures that come without IUV."""
 
     estimator: str = option(
@@ -305,188 +275,6 @@ class InputOptions(DriverOptions, SourceOptions):
             model_flag="--estimator-model",
             fit=self.fit_body,
         )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RendererOptions(_Part):
-    """What draws. `weights` may name a checkpoint that ships; None is the renderer's default."""
-
-    renderer: str = option(
-        "--renderer",
-        "Rendering",
-        " or ".join(map(_described, RENDERERS.values())) + ".",
-        default=DEFAULT_RENDERER,
-        choices=tuple(RENDERERS),
-        metavar="NAME",
-    )
-    weights: Path | None = option(
-        "--weights",
-        "Rendering",
-        "Checkpoint for nhrr, safetensors; default: lite, which ships.",
-        kind="path",
-    )
-    adapt: bool = option(
-        "--adapt",
-        "Rendering",
-        "Let the network learn the source's person first, some minutes; later runs find it done.",
-        kind="flag",
-        default=False,
-    )
-    engine: str | None = option(
-        "--engine",
-        "Rendering",
-        "What runs the network: openvino (CPUs), torch (CUDA) or onnx; default: the fastest here.",
-        choices=tuple(ENGINES),
-        metavar="NAME",
-    )
-    precision: str | None = option(
-        "--precision",
-        "Rendering",
-        "Numbers it is computed in: int8, bf16 or f32; default: the fastest here that looks alike.",
-        choices=PRECISIONS,
-        metavar="NAME",
-    )
-    device: str | None = option(
-        "--device", "Rendering", "cpu, cuda, or cuda:1; default: cuda where it is.", metavar="NAME"
-    )
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.weights is not None and RENDERERS[self.renderer].default_weights is None:
-            raise InputError(f"the {self.renderer} renderer uses no weights; leave out --weights")
-        if self.adapt and RENDERERS[self.renderer].default_weights is None:
-            raise InputError(f"the {self.renderer} renderer learns nothing; leave out --adapt")
-        if self.wish != ANYTHING and RENDERERS[self.renderer].default_weights is None:
-            raise InputError(
-                f"the {self.renderer} renderer runs no network; leave out --engine, --precision and"
-                " --device"
-            )
-        if self.device is not None:
-            check_device(self.device)
-
-    @property
-    def wish(self) -> Wish:
-        """How the network is to be run."""
-        return Wish(self.engine, self.precision, self.device)
-
-    @property
-    def weights_files(self) -> list[Path]:
-        """The files that it draws with, if any. Raises: WeightsError."""
-        return RENDERERS[self.renderer].files(self.weights)
-
-
-@dataclass(frozen=True, kw_only=True)
-class OutputOptions(_Part):
-    """What comes out. A `frame_rate` of None is the driver's, or 30; `audio` None is its own."""
-
-    background: str = option(
-        "--background",
-        "Rendering",
-        "white (default), black, #rrggbb, or photo (the source's, painted over behind the person).",
-        default="white",
-        metavar="COLOUR",
-    )
-    output: Path = option(
-        "-o --output",
-        "Output",
-        ".mp4 .mov .mkv .webm .gif, .png for one frame, or a folder of PNG.",
-        kind="path",
-        default=REQUIRED,
-    )
-    frame_rate: Fraction | None = option(
-        "--fps",
-        "Output",
-        "Such as 25 or 30000/1001; default: the driver's, or 30.",
-        kind="rate",
-        metavar="RATE",
-    )
-    codec: str | None = option(
-        "--codec", "Output", "h264, h265, vp9, av1, ffv1; default by container.", metavar="NAME"
-    )
-    crf: int | None = option(
-        "--crf",
-        "Output",
-        "Quality, lower is better; default by codec, 18 for h264.",
-        kind="integer",
-    )
-    audio: Path | None = option(
-        "--audio",
-        "Output",
-        "Sound from this file, or none; default: the driver video's own.",
-        kind="path",
-        metavar="FILE|none",
-    )
-    audio_track: int | None = option(
-        "--audio-track",
-        "Output",
-        "Which of the sound's tracks, 0 first; default: the one marked as default.",
-        kind="integer",
-        metavar="N",
-    )
-    size: str = option(
-        "--size",
-        "Output",
-        "The driver's frame (default), the square around the person, or the frame made even.",
-        default="driver",
-        choices=SIZES,
-    )
-    compare: bool = option(
-        "--compare", "Output", "Source, IUV and result side by side.", kind="flag", default=False
-    )
-    sheet: Path | None = option(
-        "--sheet", "Output", "Write a contact sheet (PNG) there as well.", kind="path"
-    )
-    force: bool = option(
-        "--force", "Output", "Replace an existing output.", kind="flag", default=False
-    )
-    restart: bool = option(
-        "--restart",
-        "Output",
-        "Begin anew, whatever an interrupted run of the same output has finished.",
-        kind="flag",
-        default=False,
-        in_manifest=False,
-    )
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        parse_colour(self.background)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RenderOptions(OutputOptions, RendererOptions, InputOptions):
-    """The options of a run: what `mt run` takes, what a manifest's jobs may set, and its defaults.
-
-    Nothing here but the content of the inputs and what is drawn decides the output's bytes:
-    `workers` never does.
-    """
-
-    SECTIONS: ClassVar = (
-        "Source",
-        "Driver",
-        "Raw pictures",
-        "Garment transfer",
-        "Rendering",
-        "Output",
-    )
-
-    workers: int | None = option(
-        "--workers",
-        "Rendering",
-        "Threads; default: one for each core.",
-        kind="integer",
-        in_manifest=False,
-    )
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"workers is {self.workers}; it must be at least 1")
-
-    @property
-    def worker_count(self) -> int:
-        """How many threads to use: as many as asked for, or one for each core that may be used."""
-        return self.workers or len(os.sched_getaffinity(0))
 
 
 def is_kept(source: Path) -> bool:
