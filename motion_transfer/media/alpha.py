@@ -6,6 +6,8 @@ colours mean nothing, and yet a codec mixes them into their neighbours', which a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
@@ -28,6 +30,22 @@ LEVELS = 6
 that the codecs here transform at once."""
 
 CELL_PX = 2**LEVELS
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture, and its opacity where it has one; the colours are straight."""
+
+    rgb: Colours
+    alpha: Alpha | None = None
+
+    def on_white(self) -> Colours:
+        """Lay the picture on paper: where it is transparent, white shows."""
+        return self.rgb if self.alpha is None else lay_on_white(self.rgb, self.alpha)
+
+    def rgba(self) -> Rgba:
+        """Put colours and alpha together."""
+        return add_alpha(self.rgb, self.alpha)
 
 
 def premultiply(colours: Colours, alpha: Alpha) -> Colours:

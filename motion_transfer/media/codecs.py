@@ -114,8 +114,6 @@ CODECS = {
         tags={"yuv422p10le": "apch", "yuva444p10le": "ap4h"},
         fits_nut=False,
     ),
-    "ffv1": Codec(
-        "ffv1", ("bgr0", "bgra"), None, {"level": "3", "slices": "4", "slicecrc": "1"}
-    ),
+    "ffv1": Codec("ffv1", ("bgr0", "bgra"), None, {"level": "3", "slices": "4", "slicecrc": "1"}),
 }
 LOSSLESS = "ffv1"

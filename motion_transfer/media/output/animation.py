@@ -75,8 +75,8 @@ def join_segments(
         context.time_base = 1 / rate
         stream.pix_fmt = pixels
         reformatter = VideoReformatter()
+        first = next(video.decode_segments(segments, rate))
+        stream.width, stream.height = first.width, first.height
         for frame in video.decode_segments(segments, rate):
-            if not stream.width:
-                stream.width, stream.height = frame.width, frame.height
             output.mux(stream.encode(reformatter.reformat(frame, format=pixels)))
         output.mux(stream.encode(None))

@@ -89,4 +89,4 @@ def _put_alpha(picture: av.VideoFrame, alpha: Alpha) -> None:
         scaled = levels.astype("<u2")[alpha]
     rows = np.zeros((plane.height, plane.line_size // scaled.itemsize), scaled.dtype)
     rows[:, : plane.width] = scaled
-    plane.update(rows)
+    plane.update(rows.tobytes())

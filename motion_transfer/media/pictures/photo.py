@@ -17,7 +17,7 @@ from PIL import ExifTags, Image, UnidentifiedImageError
 
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
-from motion_transfer.media.alpha import lay_on_white
+from motion_transfer.media.alpha import add_alpha, lay_on_white
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.pictures.colours import ProfileError, convert_lab, convert_to_srgb
 from motion_transfer.media.pictures.png import SIGNATURE, find_png_fault
@@ -77,6 +77,10 @@ class Photo:
         if self.alpha is None or self.alpha.min() == 255:
             return self.rgb
         return lay_on_white(self.rgb, self.alpha)
+
+    def rgba(self) -> UInt8[np.ndarray, "H W 4"]:
+        """Put colours and alpha together."""
+        return add_alpha(self.rgb, self.alpha)
 
 
 def read_photo(path: Path, what: str = "source") -> Photo:

@@ -7,7 +7,7 @@ its time, so that frames are repeated or left out and nothing drifts from the so
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -17,11 +17,13 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.media.alpha import Picture, Rgba, add_alpha
+from motion_transfer.media.pictures.photo import Photo, read_photo
 
 Frame = UInt8[np.ndarray, "H W 3"]
 Ticks = int | Fraction
 Shown = TypeVar("Shown")
+Held = TypeVar("Held", Photo, Picture)
 
 DEFAULT_RATE = Fraction(30)
 """Frames per second where nothing tells a rate."""
@@ -57,6 +59,8 @@ class PictureStream(ABC):
     Attributes:
         frame_rate: The rate of the frames, or None where they come without one.
         start_seconds: When the first frame is shown, on the clock of the file's sound.
+        has_alpha: Whether the first picture can be transparent; which all of an animation's do if
+            one does.
         notes: What the user should know of how this clip is read, in sentences; there may be more
             of them when it has been.
     """
@@ -68,11 +72,22 @@ class PictureStream(ABC):
         self.width = width
         self.frame_rate: Fraction | None = None
         self.start_seconds = Fraction(0)
+        self.has_alpha = False
         self.notes: tuple[str, ...] = ()
 
     @abstractmethod
     def read(self) -> Iterator[Frame]:
-        """Read every frame in order. Raises: InputError naming the frame that is broken."""
+        """Read every frame in order; where it is transparent, white shows.
+
+        Raises: InputError naming the frame that is broken.
+        """
+
+    def read_rgba(self) -> Iterator[Rgba]:
+        """Read every frame in order with its alpha, the colours not multiplied by it.
+
+        Raises: InputError naming the frame that is broken.
+        """
+        return map(add_alpha, self.read())
 
     def where(self, index: int) -> str:
         """Name the place of a frame, for messages."""
@@ -89,25 +104,45 @@ class PictureStream(ABC):
 
     def _check_size(
         self,
-        picture: Frame,
+        picture: Held,
         index: int,
         first: str = "the first picture is",
         remedy: str = "pictures of one clip need one size, give others one by one",
-    ) -> Frame:
+    ) -> Held:
         """Hold a frame to the size of the first one. Raises: InputError."""
-        if picture.shape[:2] != (self.height, self.width):
+        height, width = picture.rgb.shape[:2]
+        if (height, width) != (self.height, self.width):
             raise InputError(
-                f"{self.where(index)} is {picture.shape[1]} x {picture.shape[0]}, but {first}"
+                f"{self.where(index)} is {width} x {height}, but {first}"
                 f" {self.width} x {self.height}; {remedy}"
             )
         return picture
 
 
-class PhotoStream(PictureStream):
-    """One photo, or several of one size, turned upright as their EXIF says.
+class LayeredStream(PictureStream):
+    """Pictures that may be transparent."""
 
-    Where photos are transparent, white shows.
-    """
+    @abstractmethod
+    def _read(self) -> Iterator[Photo | Picture]:
+        """Read every picture in order; one that is repeated is the same object."""
+
+    def read(self) -> Iterator[Frame]:
+        return self._converted(lambda picture: picture.on_white())
+
+    def read_rgba(self) -> Iterator[Rgba]:
+        return self._converted(lambda picture: picture.rgba())
+
+    def _converted(self, convert: Callable[[Photo | Picture], Shown]) -> Iterator[Shown]:
+        """Convert every picture, and repeated ones once."""
+        last = converted = None
+        for picture in self._read():
+            if converted is None or picture is not last:
+                last, converted = picture, convert(picture)
+            yield converted
+
+
+class PhotoStream(LayeredStream):
+    """One photo, or several of one size, turned upright as their EXIF says."""
 
     def __init__(self, path: Path, files: list[Path] | None = None) -> None:
         """Raises: InputError if the first photo cannot be read."""
@@ -115,12 +150,13 @@ class PhotoStream(PictureStream):
         first = read_photo(self._files[0], "picture")
         super().__init__(path, len(self._files), *first.rgb.shape[:2])
         self.notes = first.notes
+        self.has_alpha = first.alpha is not None
 
-    def read(self) -> Iterator[Frame]:
+    def _read(self) -> Iterator[Photo]:
         for index, file in enumerate(self._files):
             photo = read_photo(file, "picture")
             self.notes = tuple(dict.fromkeys((*self.notes, *photo.notes)))  # may be read twice
-            yield self._check_size(photo.on_white(), index)
+            yield self._check_size(photo, index)
 
     def where(self, index: int) -> str:
         return f"frame {index}, {self._files[index]}" if self.path.is_dir() else str(self.path)
