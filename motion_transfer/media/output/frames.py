@@ -9,6 +9,7 @@ from itertools import count
 from pathlib import Path
 
 from motion_transfer.media.output.formats import OutputFormat
+from motion_transfer.media.output.pixels import prepare_picture
 from motion_transfer.media.output.segments import Segments, WriteFrame
 from motion_transfer.media.pictures.photo import write_png
 
@@ -18,7 +19,7 @@ def open_segment(path: Path, *_: object, first: int, **__: object) -> Iterator[W
     """Open a folder of PNG, numbered through the whole output."""
     path.mkdir()
     numbers = count(first)
-    yield lambda frame: write_png(path / f"{next(numbers):06d}.png", frame)
+    yield lambda frame: write_png(path / f"{next(numbers):06d}.png", prepare_picture(frame))
 
 
 def join_segments(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import cast
@@ -12,8 +11,9 @@ from av.container import OutputContainer
 from av.filter import Graph
 from av.filter.context import FilterContext
 
-from motion_transfer.media.container import open_input, open_output
+from motion_transfer.media.container import open_output
 from motion_transfer.media.output.segments import Segments
+from motion_transfer.media.output.video import decode_segments
 from motion_transfer.media.output.video import open_segment as open_segment
 
 GIF_TICK = Fraction(1, 100)  # the format counts time in hundredths of a second
@@ -25,7 +25,7 @@ def join_segments(
     """Encode segments as a looping GIF; frame times are rounded to the format's hundredths."""
     palette = _find_palette(segments, rate)
     with open_output(destination, format_name="gif", options={"loop": "0"}) as output:
-        first = next(_frames(segments, rate))
+        first = next(decode_segments(segments, rate))
         stream = output.add_stream("gif", rate=rate)
         stream.width, stream.height, stream.pix_fmt = first.width, first.height, "pal8"
         stream.codec_context.time_base = GIF_TICK
@@ -40,7 +40,7 @@ def join_segments(
         graph.configure()
         colours.push(palette)
         colours.push(None)
-        for frame in _frames(segments, rate):
+        for frame in decode_segments(segments, rate):
             pictures.push(frame)
             _drain(sink, stream, output)
         pictures.push(None)
@@ -63,13 +63,13 @@ def _drain(sink: FilterContext, stream: av.VideoStream, output: OutputContainer)
 def _find_palette(segments: Segments, rate: Fraction) -> av.VideoFrame:
     """Find the colours that suit all frames; none is spent on transparency."""
     graph = Graph()
-    source = _add_buffer(graph, next(_frames(segments, rate)), rate)
+    source = _add_buffer(graph, next(decode_segments(segments, rate)), rate)
     generate = graph.add("palettegen", "stats_mode=full:reserve_transparent=0")
     sink = graph.add("buffersink")
     source.link_to(generate)
     generate.link_to(sink)
     graph.configure()
-    for frame in _frames(segments, rate):
+    for frame in decode_segments(segments, rate):
         source.push(frame)
     source.push(None)
     return cast(av.VideoFrame, sink.pull())
@@ -80,14 +80,3 @@ def _add_buffer(graph: Graph, like: av.VideoFrame, rate: Fraction) -> FilterCont
     return graph.add_buffer(
         width=like.width, height=like.height, format=like.format, time_base=1 / rate
     )
-
-
-def _frames(segments: Segments, rate: Fraction) -> Iterator[av.VideoFrame]:
-    """Decode the frames of all segments, numbered through."""
-    index = 0
-    for path, _ in segments:
-        with open_input(path, "segment") as container:
-            for frame in container.decode(video=0):
-                frame.pts, frame.time_base = index, 1 / rate
-                yield frame
-                index += 1

@@ -19,14 +19,16 @@ from jaxtyping import UInt8
 from motion_transfer.media.output.audio import AudioCut
 from motion_transfer.media.output.formats import OutputFormat
 
-WriteFrame = Callable[[UInt8[np.ndarray, "H W 3"]], object]
+WriteFrame = Callable[[UInt8[np.ndarray, "H W C"]], object]
+"""Takes a frame: RGB, or, where the format is transparent, RGBA that is not multiplied."""
+
 Segments = Sequence[tuple[Path, int]]
 """Finished segments in order, with the number of frames in each."""
 
 
 def segment_path(folder: Path, index: int, output_format: OutputFormat) -> Path:
     """Name the segment of a chunk in the work folder."""
-    return folder / f"{index:06d}{output_format.row.segment_suffix}"
+    return folder / f"{index:06d}{output_format.segment_suffix}"
 
 
 def open_segment(

@@ -12,46 +12,52 @@ from contextlib import contextmanager
 from fractions import Fraction
 from itertools import count
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import av
 import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError
 from av.video.codeccontext import VideoCodecContext
-from av.video.reformatter import ColorRange, Colorspace, Interpolation, VideoReformatter
+from av.video.reformatter import ColorRange
 from jaxtyping import UInt8
 
 from motion_transfer.errors import OutputError
+from motion_transfer.media.alpha import ALPHA_MODE, BESIDE
 from motion_transfer.media.container import open_input, open_output
 from motion_transfer.media.output.audio import AudioCut, AudioTrack
 from motion_transfer.media.output.formats import CONTAINERS, OutputFormat
+from motion_transfer.media.output.pixels import make_converter
 from motion_transfer.media.output.segments import Segments, WriteFrame
 
-SEGMENT_CONTAINER = "nut"  # takes every codec, and any frame rate without rounding
 LONGEST_GROUP = 10_000  # frames; longer than any chunk, so that a segment is one group of pictures
 BT709 = 1  # H.273's number for primaries, transfer and matrix
+BIT_EXACT = {"fflags": "+bitexact"}  # or Matroska's are marked with random numbers
 os.environ.setdefault("SVT_LOG", "0")  # the AV1 encoder greets on stderr otherwise
 
 
 @contextmanager
 def open_segment(
-    path: Path, output_format: OutputFormat, *, size: tuple[int, int], rate: Fraction, **_: object
+    path: Path,
+    output_format: OutputFormat,
+    *,
+    size: tuple[int, int],
+    rate: Fraction,
+    mixes: bool | None = None,
+    **_: object,
 ) -> Iterator[WriteFrame]:
     """Open a closed group of pictures in an intermediate container; scene cuts may begin more.
 
+    Args:
+        mixes: As of `make_converter`.
     Raises: OutputError if the encoder refuses that size or rate.
     """
     codec = output_format.codec
     options = dict(codec.options)
     if output_format.crf is not None:
         options["crf"] = str(output_format.crf)
-    conversion: dict[str, Any] = {"format": codec.pixel_format}
-    if not codec.keeps_rgb:
-        conversion["dst_colorspace"] = Colorspace.ITU709
-        conversion["dst_color_range"] = ColorRange.MPEG
-        conversion["interpolation"] = Interpolation.AREA
-    with open_output(path, format_name=SEGMENT_CONTAINER) as container:
+    container_name = codec.segment_container
+    with open_output(path, format_name=container_name, options=BIT_EXACT) as container:
         stream = container.add_stream(codec.encoder, rate=rate, options=options)
         stream = cast(av.VideoStream, stream)
         stream.width, stream.height = size
@@ -70,11 +76,10 @@ def open_segment(
                 f" ({error.strerror}); choose another --codec or --fps"
             ) from error
         numbers = count()
-        reformatter = VideoReformatter()  # kept: to make one takes longer than to use it
+        convert = make_converter(output_format, mixes=mixes)
 
-        def write(frame: UInt8[np.ndarray, "H W 3"]) -> None:
-            picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
-            picture = reformatter.reformat(picture, **conversion)
+        def write(frame: UInt8[np.ndarray, "H W C"]) -> None:
+            picture = convert(frame)
             picture.pts, picture.time_base = next(numbers), context.time_base
             container.mux(stream.encode(picture))
 
@@ -91,13 +96,17 @@ def join_segments(
 ) -> None:
     """Copy the packets of segments into one container, and lay sound between them."""
     container = CONTAINERS[destination.suffix]
-    options = {"fflags": "+bitexact"}  # or Matroska's are marked with random numbers
+    options = dict(BIT_EXACT)
     if container.is_mp4:
         options["movflags"] = "+faststart"
+        if output_format.transparent:
+            options["movflags"] += "+use_metadata_tags"  # QuickTime's list holds any key
     orders = [_showing_order(path, rate) for path, _ in segments]
     # a frame is decoded before it is shown: decoding begins as much earlier as one ever needs
     delay = max(index - number for order in orders for index, number in enumerate(order))
     with open_output(destination, options=options) as output:
+        if output_format.alpha_mode:
+            output.metadata[ALPHA_MODE] = output_format.alpha_mode
         stream = sound = None
         first = 0
         for (path, frame_count), order in zip(segments, orders, strict=True):
@@ -108,6 +117,8 @@ def join_segments(
                     stream.time_base = 1 / rate
                     if not output_format.codec.keeps_rgb:
                         _tag_bt709(stream.codec_context)  # VP9 does not carry all of it itself
+                    if template.metadata.get(ALPHA_MODE) == BESIDE:
+                        stream.metadata[ALPHA_MODE] = BESIDE
                     if output_format.codec.tag and container.is_mp4:
                         stream.codec_context.codec_tag = output_format.codec.tag
                     if audio is not None:
@@ -126,6 +137,17 @@ def join_segments(
             first += frame_count
         if sound is not None:
             sound.write_until(None)
+
+
+def decode_segments(segments: Segments, rate: Fraction) -> Iterator[av.VideoFrame]:
+    """Decode the frames of all segments, numbered through."""
+    index = 0
+    for path, _ in segments:
+        with open_input(path, "segment") as container:
+            for frame in container.decode(video=0):
+                frame.pts, frame.time_base = index, 1 / rate
+                yield frame
+                index += 1
 
 
 def _tag_bt709(context: VideoCodecContext) -> None:

@@ -17,6 +17,7 @@ from PIL import ExifTags, Image, UnidentifiedImageError
 
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
+from motion_transfer.media.alpha import add_alpha, lay_on_white
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.pictures.colours import ProfileError, convert_lab, convert_to_srgb
 from motion_transfer.media.pictures.png import SIGNATURE, find_png_fault
@@ -75,9 +76,11 @@ class Photo:
         """Lay the picture on paper: where it is transparent, white shows."""
         if self.alpha is None or self.alpha.min() == 255:
             return self.rgb
-        weight = self.alpha[..., None].astype(np.uint16)
-        # in whole numbers, + 127 to round: the same bytes on every machine
-        return ((self.rgb * weight + 255 * (255 - weight) + 127) // 255).astype(np.uint8)
+        return lay_on_white(self.rgb, self.alpha)
+
+    def rgba(self) -> UInt8[np.ndarray, "H W 4"]:
+        """Put colours and alpha together."""
+        return add_alpha(self.rgb, self.alpha)
 
 
 def read_photo(path: Path, what: str = "source") -> Photo:
@@ -237,9 +240,10 @@ def _with_8_bits(file: Image.Image) -> Image.Image:
     return image
 
 
-def write_png(path: Path, pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W"]) -> None:
-    """Write a picture, RGB or grey, as PNG. Raises: OSError."""
-    ok, encoded = cv2.imencode(".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels)
+def write_png(path: Path, pixels: UInt8[np.ndarray, "H W C"] | UInt8[np.ndarray, "H W"]) -> None:
+    """Write a picture, RGB, RGBA or grey, as PNG. Raises: OSError."""
+    order = [2, 1, 0, 3][: pixels.shape[-1]]  # OpenCV's
+    ok, encoded = cv2.imencode(".png", pixels[..., order] if pixels.ndim == 3 else pixels)
     if not ok:
         raise OSError(f"cannot encode a PNG of {pixels.shape}")
     path.write_bytes(encoded.tobytes())

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
-from itertools import accumulate
+from functools import partial
+from itertools import accumulate, islice
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -22,7 +23,7 @@ from motion_transfer.media.pictures.photo import (
 from motion_transfer.media.pictures.png import find_png_fault
 from motion_transfer.media.pictures.stream import (
     LARGEST_DENOMINATOR,
-    Frame,
+    LayeredStream,
     PhotoStream,
     PictureStream,
     Timing,
@@ -46,10 +47,10 @@ def open_several(path: Path) -> PictureStream:
     return clip if clip and clip.frame_count > 1 else PhotoStream(path)
 
 
-class AnimatedPicture(PictureStream):
+class AnimatedPicture(LayeredStream):
     """The pictures of one file: at a constant rate, or pages, which have no times.
 
-    They are turned upright as their EXIF says; where they are transparent, white shows.
+    They are turned upright as their EXIF says.
     """
 
     def __init__(self, path: Path, count: int) -> None:
@@ -58,10 +59,12 @@ class AnimatedPicture(PictureStream):
         sizes: list[tuple[int, ...]] = []
         durations: list[Fraction] = []
         notes: list[str] = []
+        has_alpha = False
         for photo, shown in self._decode(path):
             sizes.append(photo.rgb.shape[:2])
             durations.append(shown)
             notes.extend(photo.notes)
+            has_alpha = has_alpha or photo.alpha is not None
         *self._begins, total = accumulate(durations, initial=Fraction(0))
         self._timing: Timing | None = None
         if total:
@@ -72,15 +75,16 @@ class AnimatedPicture(PictureStream):
         if self._timing:
             self._take_timing(self._timing)
         self.notes += tuple(dict.fromkeys(notes))  # all pictures may have the same
+        self.has_alpha = has_alpha
 
-    def read(self) -> Iterator[Frame]:
+    def _play(self, start: int) -> Iterator[Callable[[], Photo]]:
         pictures = (
-            self._check_size(photo.on_white(), number)
+            partial(self._check_size, photo, number)
             for number, (photo, _) in enumerate(self._decode(self.path))
         )
         if self._timing is None:
-            return pictures
-        return show_steadily(zip(self._begins, pictures, strict=True), self._timing)
+            return islice(pictures, start, None)
+        return show_steadily(zip(self._begins, pictures, strict=True), self._timing, start)
 
     def _decode(self, path: Path) -> Iterator[tuple[Photo, Fraction]]:
         """Decode every picture, each with how long it is shown, in seconds; 0 for a page."""

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from itertools import islice
 from pathlib import Path
 from typing import TypeVar
@@ -19,11 +19,13 @@ import numpy as np
 from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.pictures.photo import read_photo
+from motion_transfer.media.alpha import Picture, Rgba, add_alpha
+from motion_transfer.media.pictures.photo import Photo, read_photo
 
 Frame = UInt8[np.ndarray, "H W 3"]
 Ticks = int | Fraction
 Shown = TypeVar("Shown")
+Held = TypeVar("Held", Photo, Picture)
 
 DEFAULT_RATE = Fraction(30)
 """Frames per second where nothing tells a rate."""
@@ -63,6 +65,8 @@ class PictureStream(ABC):
     Attributes:
         frame_rate: The rate of the frames, or None where they come without one.
         start_seconds: When the first frame is shown, on the clock of the file's sound.
+        has_alpha: Whether the first picture can be transparent; which all of an animation's do if
+            one does.
         notes: What the user should know of how this clip is read, in sentences; there may be more
             of them when it has been.
     """
@@ -74,19 +78,31 @@ class PictureStream(ABC):
         self.width = width
         self.frame_rate: Fraction | None = None
         self.start_seconds = Fraction(0)
+        self.has_alpha = False
         self.notes: tuple[str, ...] = ()
 
     @abstractmethod
     def read(self) -> Iterator[Frame]:
-        """Read every frame in order. Raises: InputError naming the frame that is broken."""
+        """Read every frame in order; where it is transparent, white shows.
+
+        Raises: InputError naming the frame that is broken.
+        """
+
+    def read_rgba(self) -> Iterator[Rgba]:
+        """Read every frame in order with its alpha, the colours not multiplied by it.
+
+        Raises: InputError naming the frame that is broken.
+        """
+        return map(add_alpha, self.read())
 
     def play(self, start: int = 0) -> Iterator[Callable[[], Frame]]:
         """Give each frame from `start` on as a call that makes it: who skips it pays little.
 
-        Raises: InputError naming the frame that is broken, also in the calls.
+        A frame that is repeated is the same object. Raises: InputError, see `read`, also in the
+        calls.
         """
-        for picture in islice(self.read(), start, None):
-            yield partial(_itself, picture)
+        for frame in islice(self.read(), start, None):
+            yield partial(_itself, frame)
 
     def where(self, index: int) -> str:
         """Name the place of a frame, for messages."""
@@ -103,25 +119,50 @@ class PictureStream(ABC):
 
     def _check_size(
         self,
-        picture: Frame,
+        picture: Held,
         index: int,
         first: str = "the first picture is",
         remedy: str = "pictures of one clip need one size, give others one by one",
-    ) -> Frame:
+    ) -> Held:
         """Hold a frame to the size of the first one. Raises: InputError."""
-        if picture.shape[:2] != (self.height, self.width):
+        height, width = picture.rgb.shape[:2]
+        if (height, width) != (self.height, self.width):
             raise InputError(
-                f"{self.where(index)} is {picture.shape[1]} x {picture.shape[0]}, but {first}"
+                f"{self.where(index)} is {width} x {height}, but {first}"
                 f" {self.width} x {self.height}; {remedy}"
             )
         return picture
 
 
-class PhotoStream(PictureStream):
-    """One photo, or several of one size, turned upright as their EXIF says.
+class LayeredStream(PictureStream):
+    """Pictures that may be transparent."""
 
-    Where photos are transparent, white shows.
-    """
+    @abstractmethod
+    def _play(self, start: int) -> Iterator[Callable[[], Photo | Picture]]:
+        """Give calls that make the pictures; of one that is repeated it is the same call."""
+
+    def read(self) -> Iterator[Frame]:
+        return (frame() for frame in self.play())
+
+    def read_rgba(self) -> Iterator[Rgba]:
+        return (frame() for frame in self._converted(0, lambda picture: picture.rgba()))
+
+    def play(self, start: int = 0) -> Iterator[Callable[[], Frame]]:
+        return self._converted(start, lambda picture: picture.on_white())
+
+    def _converted(
+        self, start: int, convert: Callable[[Photo | Picture], Shown]
+    ) -> Iterator[Callable[[], Shown]]:
+        """Have every picture converted, and repeated ones once."""
+        last = converted = None
+        for make in self._play(start):
+            if converted is None or make is not last:
+                last, converted = make, cache(partial(_convert, make, convert))
+            yield converted
+
+
+class PhotoStream(LayeredStream):
+    """One photo, or several of one size, turned upright as their EXIF says."""
 
     def __init__(self, path: Path, files: list[Path] | None = None) -> None:
         """Raises: InputError if the first photo cannot be read."""
@@ -129,17 +170,15 @@ class PhotoStream(PictureStream):
         first = read_photo(self._files[0], "picture")
         super().__init__(path, len(self._files), *first.rgb.shape[:2])
         self.notes = first.notes
+        self.has_alpha = first.alpha is not None
 
-    def read(self) -> Iterator[Frame]:
-        return (picture() for picture in self.play())
+    def _play(self, start: int) -> Iterator[Callable[[], Photo]]:
+        return (partial(self._photo, index) for index in range(start, len(self._files)))
 
-    def play(self, start: int = 0) -> Iterator[Callable[[], Frame]]:
-        return (partial(self._read, index) for index in range(start, len(self._files)))
-
-    def _read(self, index: int) -> Frame:
+    def _photo(self, index: int) -> Photo:
         photo = read_photo(self._files[index], "picture")
         self.notes = tuple(dict.fromkeys((*self.notes, *photo.notes)))  # may be read twice
-        return self._check_size(photo.on_white(), index)
+        return self._check_size(photo, index)
 
     def where(self, index: int) -> str:
         return f"frame {index}, {self._files[index]}" if self.path.is_dir() else str(self.path)
@@ -202,3 +241,9 @@ def show_steadily(
 
 def _itself(frame: Frame) -> Frame:
     return frame
+
+
+def _convert(
+    make: Callable[[], Photo | Picture], convert: Callable[[Photo | Picture], Shown]
+) -> Shown:
+    return convert(make())

@@ -9,18 +9,27 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 
 import av
 import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError
-from jaxtyping import Int32
+from jaxtyping import Int32, UInt8
 
 from motion_transfer.errors import InputError
+from motion_transfer.media.alpha import Picture
 from motion_transfer.media.container import find_pictures, open_input
+from motion_transfer.media.pictures.decoding import (
+    decode_frames,
+    describe_colours,
+    find_alpha,
+    find_alpha_mode,
+    to_picture,
+)
 from motion_transfer.media.pictures.display import (
     deinterlaced,
     describe_pixels,
@@ -29,10 +38,27 @@ from motion_transfer.media.pictures.display import (
 )
 from motion_transfer.media.pictures.stream import (
     Frame,
-    PictureStream,
+    LayeredStream,
     plan_timing,
     show_steadily,
 )
+
+Pixels = UInt8[np.ndarray, "H W *C"]
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """How a file's frames become pictures, as it says itself.
+
+    Attributes:
+        pixel_ratio: Width by height of a pixel.
+        matrix: Turns it upright, if the file asks for that.
+        premultiplied: Whether colours are multiplied by alpha.
+    """
+
+    pixel_ratio: Fraction
+    matrix: Int32[np.ndarray, "3 3"] | None
+    premultiplied: bool
 
 
 class IndexedVideo:
@@ -61,12 +87,14 @@ class IndexedVideo:
         where = f"frame {index} of {self.path}"
         with _opened(self.path, lambda reason: _damaged(where, reason)) as (container, stream):
             container.seek(before, stream=stream, backward=True)
-            for frame in pick_frames(deinterlaced(container.decode(stream)), [wanted]):
-                return _show(frame, find_pixel_ratio(stream), _display_matrix(frame))
+            premultiplied = find_alpha_mode(container, stream) == "premultiplied"
+            for frame in pick_frames(deinterlaced(decode_frames(container, stream)), [wanted]):
+                shape = _Shape(find_pixel_ratio(stream), _display_matrix(frame), premultiplied)
+                return _show(frame, shape).on_white()
         raise InputError(f"{where} cannot be decoded; export it again")
 
 
-class FilmedVideo(PictureStream):
+class FilmedVideo(LayeredStream):
     """A video as a clip: upright, of whole frames with square pixels, and at a constant rate."""
 
     def __init__(self, path: Path) -> None:
@@ -86,56 +114,56 @@ class FilmedVideo(PictureStream):
         self._timing = plan_timing(times, base, rate and Fraction(rate), path)
         self._clocked = all(pts is not None for pts, _ in times)
         with _opened(path, refuse) as (container, stream):
-            first = next(container.decode(stream), None)
+            first = next(decode_frames(container, stream), None)
             if first is None:
                 raise InputError(f"video {path} holds no frames")
-            self._pixel_ratio, self._matrix = find_pixel_ratio(stream), _display_matrix(first)
-            height, width = _show(first, self._pixel_ratio, self._matrix).shape[:2]
-            notes = describe_pixels(path, stream)
+            mode = find_alpha_mode(container, stream)
+            ratio, matrix = find_pixel_ratio(stream), _display_matrix(first)
+            self._shape = _Shape(ratio, matrix, mode == "premultiplied")
+            height, width = _show(first, self._shape).rgb.shape[:2]
+            notes = describe_pixels(path, stream) + describe_colours(path, stream, first, mode)
             if first.interlaced_frame:
                 notes += (f"{path} is interlaced; every frame is made whole (FFmpeg's bwdif)",)
         super().__init__(path, self._timing.count, height, width)
         self._take_timing(self._timing)
         self.notes += notes
+        self.has_alpha = find_alpha(first) is not None
 
-    def read(self) -> Iterator[Frame]:
-        return (picture() for picture in self.play())
-
-    def play(self, start: int = 0) -> Iterator[Callable[[], Frame]]:
+    def _play(self, start: int) -> Iterator[Callable[[], Picture]]:
         shown: av.VideoFrame | None = None
-        picture: Callable[[], Frame] | None = None
+        make: Callable[[], Picture] | None = None
         index = start
         with _opened(self.path, lambda reason: _damaged(self.where(index), reason)) as video:
             if start and self._clocked:
                 self._seek(*video, start)
             for frame in show_steadily(self._decode(*video), self._timing, start):
-                if picture is None or frame is not shown:  # repeated frames are converted once
-                    shown, picture = frame, cache(partial(self._shown, frame, index))
-                yield picture
+                if make is None or frame is not shown:
+                    shown, make = frame, partial(self._shown, frame, index)
+                yield make
                 index += 1
         if shown is None:
             raise InputError(f"video {self.path} holds no frames from {start} on; export it again")
 
     def _seek(self, container: InputContainer, stream: av.VideoStream, index: int) -> None:
         """Go to the last key frame that is not shown after a frame."""
-        base = stream.time_base or Fraction(1)
-        # one more: what is interlaced is told by its neighbours
+        # one before: what is interlaced is told by its neighbours
         middle = self._timing.middle_seconds(max(0, index - 1))
-        container.seek(int(middle / base), stream=stream, backward=True)
+        time = int(middle / (stream.time_base or Fraction(1)))
+        container.seek(time, stream=stream, backward=True)
 
     def _decode(
         self, container: InputContainer, stream: av.VideoStream
     ) -> Iterator[tuple[Fraction, av.VideoFrame]]:
         """Decode frames, each with when it is shown, in seconds."""
         stream.thread_type = "AUTO"
-        for number, frame in enumerate(deinterlaced(container.decode(stream))):
+        for number, frame in enumerate(deinterlaced(decode_frames(container, stream))):
             if self._clocked and frame.pts is not None and frame.time_base is not None:
                 yield frame.pts * frame.time_base, frame
             else:
                 yield self.start_seconds + number / self._timing.rate, frame
 
-    def _shown(self, frame: av.VideoFrame, index: int) -> Frame:
-        picture = _show(frame, self._pixel_ratio, self._matrix)
+    def _shown(self, frame: av.VideoFrame, index: int) -> Picture:
+        picture = _show(frame, self._shape)
         return self._check_size(picture, index, "the video began with", "export it in one size")
 
 
@@ -158,7 +186,7 @@ def pick_frames(
             return
 
 
-def turn_upright(picture: Frame, matrix: Int32[np.ndarray, "3 3"] | None) -> Frame:
+def turn_upright(picture: Pixels, matrix: Int32[np.ndarray, "3 3"] | None) -> Pixels:
     """Turn a picture as a display matrix says: quarter turns and mirrors; others are left alone.
 
     Convention: rows of the matrix say where the picture's x and y go, x to the right, y down.
@@ -167,7 +195,7 @@ def turn_upright(picture: Frame, matrix: Int32[np.ndarray, "3 3"] | None) -> Fra
         return picture
     (a, b), (c, d) = matrix[:2, :2].tolist()
     if abs(b) > abs(a) and abs(c) > abs(d):
-        picture, a, d = picture.transpose(1, 0, 2), c, b
+        picture, a, d = picture.swapaxes(0, 1), c, b
     if a < 0:
         picture = picture[:, ::-1]
     if d < 0:
@@ -175,12 +203,12 @@ def turn_upright(picture: Frame, matrix: Int32[np.ndarray, "3 3"] | None) -> Fra
     return np.ascontiguousarray(picture)
 
 
-def _show(
-    frame: av.VideoFrame, pixel_ratio: Fraction, matrix: Int32[np.ndarray, "3 3"] | None
-) -> Frame:
+def _show(frame: av.VideoFrame, shape: _Shape) -> Picture:
     """Turn a frame into a picture as it is shown: RGB, with square pixels, upright."""
-    width, height = square_size(frame.width, frame.height, pixel_ratio)
-    return turn_upright(frame.to_ndarray(format="rgb24", width=width, height=height), matrix)
+    size = square_size(frame.width, frame.height, shape.pixel_ratio)
+    picture = to_picture(frame, size, premultiplied=shape.premultiplied)
+    alpha = None if picture.alpha is None else turn_upright(picture.alpha, shape.matrix)
+    return Picture(turn_upright(picture.rgb, shape.matrix), alpha)
 
 
 def _display_matrix(frame: av.VideoFrame) -> Int32[np.ndarray, "3 3"] | None:
