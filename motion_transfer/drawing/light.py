@@ -16,7 +16,7 @@ SHADOW_SLANT = 0.22  # likewise: how far it lies to the right
 SHADOW_DARKNESS, CONTACT_DARKNESS = 0.35, 0.55  # where it is deepest: under the body, at the feet
 SHADOW_SOFTNESS, CONTACT_SOFTNESS = 0.02, 0.008  # deviation of the blur, in shares of the window
 CONTACT_HEIGHT = 0.1  # of the person: what is so near the ground touches it, or nearly
-CONTACT_FLATNESS = 0.15
+CONTACT_FLATNESS = 0.4
 LIFT_FADES = 0.25  # of the person's height: feet so far above the ground leave a third of a shadow
 
 MATCHED = 0.5  # of the way to the background's light; all of it would make night of every shade
