@@ -369,12 +369,39 @@ def test_a_draft_gives_way_to_the_network(page) -> None:
 
 def test_a_background_shows_at_once(page) -> None:
     assert pixel(page, 5, 5) == pytest.approx([255, 255, 255], abs=4)
-    page.get_by_label("Background", exact=True).select_option("black")
+    black = page.get_by_role("button", name="Background: Black")
+    black.click()
     until(lambda: max(pixel(page, 5, 5)) < 8)
-    page.get_by_label("Background", exact=True).select_option("custom")
+    expect(black).to_have_attribute("aria-pressed", "true")
     page.get_by_label("Background colour").fill("#20c040")
     until(lambda: pixel(page, 5, 5) == pytest.approx([0x20, 0xC0, 0x40], abs=12))
     expect(page.get_by_label("The same as a command")).to_contain_text("#20c040")
+
+
+def test_a_scene_is_set(page, preview, tmp_path) -> None:
+    Image.new("RGB", (64, 64), (200, 40, 90)).save(tmp_path / "wall.png")
+    page.locator("#background-file").set_input_files(tmp_path / "wall.png")
+    until(lambda: pixel(page, 5, 5) == pytest.approx([200, 40, 90], abs=8))
+    command = page.get_by_label("The same as a command")
+    expect(command).to_contain_text("--background preview.sources/")
+    tile = page.get_by_role("button", name="Background: wall.png")
+    expect(tile).to_have_attribute("aria-pressed", "true")
+    until(lambda: tile.locator("img").evaluate("image => image.naturalWidth > 0"))
+    page.get_by_label("Place").fill("0.2,0.5")
+    page.get_by_label("Place").press("Enter")
+    expect(page.locator("#fault-place")).to_contain_text("write X,Y,SCALE")
+    page.get_by_label("Place").fill("0.2,0.5,0.5")
+    page.get_by_label("Place").press("Enter")
+    expect(command).to_contain_text("--place 0.2,0.5,0.5")
+    page.get_by_label("Shadow at the feet").check()
+    expect(command).to_contain_text("--shadow")
+    page.get_by_role("button", name="Background: None").click()
+    expect(command).to_contain_text("--background transparent")
+    until(lambda: pixel(page, 5, 5) in ([255] * 3, [204] * 3))
+    page.get_by_label("Place").fill("")
+    page.get_by_label("Place").press("Enter")
+    expect(command).not_to_contain_text("--place")
+    assert preview.post("options", {"shadow": False, "background": "white"}) == 200
 
 
 def test_a_value_that_cannot_be_is_refused_in_words(page) -> None:

@@ -8,13 +8,7 @@ const WORDS = {
   nhrr: "nhrr (network)",
   texture: "texture (draft)",
   largest: "largest",
-  white: "white",
-  black: "black",
-  photo: "the photo's",
-  custom: "a colour…",
 };
-const BACKGROUNDS = ["white", "black", "photo", "custom"];
-const COLOUR_PAUSE_MS = 150; // a colour picker tells of every shade it passes
 
 /** Returns choose(changes), which posts options and shows what the server says to them. */
 export function setUpOptions(looking) {
@@ -31,31 +25,12 @@ export function setUpOptions(looking) {
   for (const option of ["renderer", "person", "driver_person"]) {
     byId(option).addEventListener("change", (event) => choose({ [option]: event.target.value }));
   }
-  setUpBackground(choose);
   setUpRange(looking, choose);
   byId("frame_rate").addEventListener("change", (event) => {
     choose({ frame_rate: event.target.value.trim() });
   });
   looking.addEventListener("state", () => showOptions(looking));
   return choose;
-}
-
-function setUpBackground(choose) {
-  const [select, colour] = [byId("background"), byId("colour")];
-  let pause;
-  select.addEventListener("change", () => {
-    colour.hidden = select.value !== "custom";
-    choose({ background: colour.hidden ? select.value : colour.value });
-  });
-  colour.addEventListener("input", () => {
-    clearTimeout(pause);
-    colour.dataset.typed = "yes"; // states that come meanwhile know nothing of it yet
-    pause = setTimeout(async () => {
-      const shade = colour.value;
-      await choose({ background: shade });
-      if (colour.value === shade) delete colour.dataset.typed;
-    }, COLOUR_PAUSE_MS);
-  });
 }
 
 function setUpRange(looking, choose) {
@@ -87,12 +62,6 @@ function showOptions(looking) {
   const { options, choices } = looking.state;
   for (const name of ["renderer", "person", "driver_person"]) {
     fill(byId(name), choices[name] ?? [], options[name]);
-  }
-  const isNamed = BACKGROUNDS.includes(options.background);
-  fill(byId("background"), BACKGROUNDS, isNamed ? options.background : "custom");
-  byId("colour").hidden = isNamed;
-  if (!isNamed && !byId("colour").dataset.typed && /^#[0-9a-f]{6}$/i.test(options.background)) {
-    byId("colour").value = options.background;
   }
   showRange(looking);
 }

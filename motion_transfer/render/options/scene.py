@@ -89,6 +89,7 @@ class SceneOptions(Part):
         "Where the feet stand at first, in shares of the frame from its left and top, and how much"
         " larger the person is than in the driver: 0.5,0.9,1.5.",
         metavar="X,Y,SCALE",
+        parse=lambda written: written or None,
     )
     on_the_spot: bool = option(
         "--on-the-spot",
