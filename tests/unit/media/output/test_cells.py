@@ -343,3 +343,24 @@ def test_the_names_of_cells_are_their_own() -> None:
     rows = [cell.row for cell in CELLS]
     assert len(set(rows)) == len(rows)
     assert all(a != b for a, b in itertools.pairwise(rows))
+
+
+@pytest.mark.parametrize("name", ["out.webp", "out.apng", "out.mov"])
+def test_a_run_writes_the_same_bytes_with_any_number_of_workers(studio, name: str) -> None:
+    from motion_transfer import render_video
+
+    files = []
+    for workers in (1, 2):
+        output = studio.folder / str(workers) / name
+        output.parent.mkdir()
+        render_video(
+            studio.source(),
+            studio.array(52),  # two chunks
+            output,
+            renderer="texture",
+            codec="prores" if name == "out.mov" else None,
+            workers=workers,
+        )
+        files.append(output.read_bytes())
+        assert open_pictures(output).frame_count == 52
+    assert files[0] == files[1]
