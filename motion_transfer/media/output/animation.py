@@ -11,6 +11,7 @@ from typing import Any, cast
 import av
 from av.video.reformatter import VideoReformatter
 
+from motion_transfer.errors import OutputError
 from motion_transfer.media.container import open_output
 from motion_transfer.media.output import video
 from motion_transfer.media.output.formats import OutputFormat
@@ -27,6 +28,7 @@ class Animation:
         options: The encoder's.
         loop: The container's option that makes it play for ever.
         mixes: Whether the colours of neighbours are mixed.
+        longest_side: The format's limit, px.
     """
 
     encoder: str
@@ -34,6 +36,7 @@ class Animation:
     options: dict[str, str] = field(default_factory=dict)
     loop: dict[str, str] = field(default_factory=dict)
     mixes: bool = False
+    longest_side: int | None = None
 
 
 ANIMATIONS = {
@@ -44,17 +47,26 @@ ANIMATIONS = {
         {"quality": "90", "compression_level": "4"},
         {"loop": "0"},
         mixes=True,
+        longest_side=16_383,
     ),
     "apng": Animation("apng", ("rgb24", "rgba"), {"pred": "mixed"}, {"plays": "0"}),
 }
 
 
 def open_segment(
-    path: Path, output_format: OutputFormat, **settings: Any
+    path: Path, output_format: OutputFormat, *, size: tuple[int, int], **settings: Any
 ) -> AbstractContextManager[WriteFrame]:
-    """Open a lossless segment whose colours are prepared for the format that comes of it."""
-    mixes = ANIMATIONS[output_format.kind].mixes
-    return video.open_segment(path, output_format, mixes=mixes, **settings)
+    """Open a lossless segment whose colours are prepared for the format that comes of it.
+
+    Raises: OutputError for a size that the format cannot hold.
+    """
+    animation = ANIMATIONS[output_format.kind]
+    if animation.longest_side and max(size) > animation.longest_side:
+        raise OutputError(
+            f"{output_format.kind} cannot hold {size[0]} x {size[1]}, its longest side is"
+            f" {animation.longest_side} px; choose another ending"
+        )
+    return video.open_segment(path, output_format, size=size, mixes=animation.mixes, **settings)
 
 
 def join_segments(

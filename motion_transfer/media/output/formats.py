@@ -238,8 +238,8 @@ def _choose_pixels(name: str, pix_fmt: str | None, *, transparent: bool) -> Code
         raise OutputError(
             f"--pix-fmt {pix_fmt} {reason} this output; {name} takes {', '.join(fitting)} here"
         )
-    known = av.Codec(codec.encoder, "w").video_formats or []
-    if pix_fmt not in [form.name for form in known]:
+    known = av.Codec(codec.encoder, "w").video_formats  # some encoders do not say
+    if known and pix_fmt not in [form.name for form in known]:
         raise OutputError(
             f"--pix-fmt {pix_fmt}: the installed FFmpeg's {codec.encoder} takes none; leave it out"
         )

@@ -25,6 +25,8 @@ from motion_transfer.media.alpha import (
 )
 from motion_transfer.media.output.formats import OutputFormat
 
+BT709 = 1  # H.273's number for primaries, transfer and matrix
+
 Convert = Callable[[UInt8[np.ndarray, "H W C"]], av.VideoFrame]
 """Makes what an encoder takes of a frame, RGB, or RGBA where alpha is written."""
 
@@ -46,10 +48,16 @@ def make_converter(output_format: OutputFormat, *, mixes: bool | None = None) ->
     if deep or output_format.transparent:
         conversion["threads"] = 1  # measured: in 10 bits, other bytes from run to run with more
     reformatter = VideoReformatter()  # kept: to make one takes longer than to use it
+
+    def reformat(pixels: UInt8[np.ndarray, "H W C"], pixel_format: str) -> av.VideoFrame:
+        picture = av.VideoFrame.from_ndarray(pixels, format=pixel_format)
+        picture = reformatter.reformat(picture, **conversion)
+        if not codec.keeps_rgb:
+            picture.color_primaries = picture.color_trc = BT709  # ProRes asks every frame
+        return picture
+
     if not output_format.transparent:
-        return lambda frame: reformatter.reformat(
-            av.VideoFrame.from_ndarray(frame, format="rgb24"), **conversion
-        )
+        return lambda frame: reformat(frame, "rgb24")
     if output_format.premultiplied:
         prepare = premultiply
     else:
@@ -60,10 +68,8 @@ def make_converter(output_format: OutputFormat, *, mixes: bool | None = None) ->
         colours, alpha = split_alpha(frame)
         colours = prepare(colours, alpha)
         if codec.keeps_rgb:
-            picture = av.VideoFrame.from_ndarray(add_alpha(colours, alpha), format="rgba")
-            return reformatter.reformat(picture, **conversion)
-        picture = av.VideoFrame.from_ndarray(colours, format="rgb24")
-        picture = reformatter.reformat(picture, **conversion)
+            return reformat(add_alpha(colours, alpha), "rgba")
+        picture = reformat(colours, "rgb24")
         _put_alpha(picture, alpha)
         return picture
 

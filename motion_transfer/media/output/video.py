@@ -27,11 +27,10 @@ from motion_transfer.media.alpha import ALPHA_MODE, BESIDE
 from motion_transfer.media.container import open_input, open_output
 from motion_transfer.media.output.audio import AudioCut, AudioTrack
 from motion_transfer.media.output.formats import CONTAINERS, OutputFormat
-from motion_transfer.media.output.pixels import make_converter
+from motion_transfer.media.output.pixels import BT709, make_converter
 from motion_transfer.media.output.segments import Segments, WriteFrame
 
 LONGEST_GROUP = 10_000  # frames; longer than any chunk, so that a segment is one group of pictures
-BT709 = 1  # H.273's number for primaries, transfer and matrix
 BIT_EXACT = {"fflags": "+bitexact"}  # or Matroska's are marked with random numbers
 os.environ.setdefault("SVT_LOG", "0")  # the AV1 encoder greets on stderr otherwise
 

@@ -65,8 +65,7 @@ class PictureStream(ABC):
     Attributes:
         frame_rate: The rate of the frames, or None where they come without one.
         start_seconds: When the first frame is shown, on the clock of the file's sound.
-        has_alpha: Whether the first picture can be transparent; which all of an animation's do if
-            one does.
+        has_alpha: Whether there is alpha: in the first picture, or in any one of an animation.
         notes: What the user should know of how this clip is read, in sentences; there may be more
             of them when it has been.
     """

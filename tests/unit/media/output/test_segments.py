@@ -15,6 +15,7 @@ from types import ModuleType
 import av
 import numpy as np
 import pytest
+from PIL import Image
 
 from motion_transfer.errors import OutputError
 from motion_transfer.media.codecs import CODECS
@@ -137,12 +138,34 @@ def test_a_higher_crf_makes_a_smaller_file(tmp_path: Path) -> None:
     assert sizes[1] < sizes[0] / 2
 
 
-@pytest.mark.parametrize("codec", ["h264", "h265", "vp9", "av1", "ffv1"])
+@pytest.mark.parametrize("codec", ["h264", "h265", "vp9", "av1", "ffv1", "prores"])
 def test_the_smallest_window_can_be_encoded(tmp_path: Path, codec: str) -> None:
     path = write(
         tmp_path / "out.mkv", codec=codec, counts=(2,), paint=lambda _: grey(9)[:16, :16].copy()
     )
     assert len(read(path)) == 2
+
+
+@pytest.mark.parametrize("suffix", [".webp", ".apng"])
+@pytest.mark.parametrize("rate", [Fraction(25), Fraction(30), RATE], ids=str)
+def test_an_animation_keeps_frames_and_time(tmp_path: Path, suffix: str, rate: Fraction) -> None:
+    path = write(tmp_path / f"out{suffix}", rate=rate)
+    begins = 0.0
+    with Image.open(path) as file:
+        assert file.n_frames == TOTAL
+        assert file.info["loop"] == 0  # for ever
+        for index in range(TOTAL):
+            file.seek(index)
+            level = np.asarray(file.convert("RGB")).mean()
+            assert level / STEP == pytest.approx(index, abs=0.3)
+            assert begins == pytest.approx(1000 * float(index / rate), abs=1.01)
+            begins += file.info["duration"]
+    assert begins == pytest.approx(1000 * float(TOTAL / rate), abs=1.01)
+
+
+def test_an_animation_has_a_largest_size(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="webp cannot hold 16384 x 4, its longest side is 16383"):
+        write(tmp_path / "out.webp", paint=lambda _: np.zeros((4, 16_384, 3), np.uint8))
 
 
 @pytest.mark.parametrize("rate", [Fraction(25), Fraction(30), RATE], ids=str)
