@@ -37,7 +37,8 @@ KEYED_ELSEWHERE = {
     *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
     *("frames", "frame_rate"),  # by the plan
     *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
-    *("renderer", "engine", "precision", "device", "codec", "crf"),  # by the recipe and the format
+    *("renderer", "engine", "precision", "device"),  # by the recipe
+    *("codec", "crf", "pix_fmt", "alpha"),  # by the format
     *("partners", "background"),  # by the cast, and by the file's content
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio", "audio_track"),  # made when everything is drawn
