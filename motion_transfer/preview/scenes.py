@@ -32,9 +32,9 @@ from motion_transfer.render.backdrop import (
     no_pictures,
     open_background,
 )
-from motion_transfer.render.composition import make_canvas, make_still, person_light
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
 from motion_transfer.render.placing import place_people
+from motion_transfer.render.scene import make_canvas, make_still, person_light
 
 KEPT = 4  # results of each step: some options back and forth without waiting
 THUMB_SIZE = (90, 120)  # height and width, px: of a tile of the page, for dense screens

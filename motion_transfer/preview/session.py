@@ -39,7 +39,6 @@ from motion_transfer.preview.views import (
     write_proxies,
 )
 from motion_transfer.render.backdrop import no_pictures, open_background
-from motion_transfer.render.composition import frame_size
 from motion_transfer.render.driver import open_driver
 from motion_transfer.render.inputs import (
     appearance_files,
@@ -55,6 +54,7 @@ from motion_transfer.render.options import (
     is_kept,
     parse_window,
 )
+from motion_transfer.render.scene import frame_size
 from motion_transfer.render.source_pictures import first_picture
 
 CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's

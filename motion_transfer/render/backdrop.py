@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import islice, repeat
@@ -77,7 +76,7 @@ class Still:
         return self
 
     def read(self, start: int, stop: int) -> Iterator[Frame | None]:
-        return repeat(self.picture, stop - start)
+        yield from repeat(self.picture, stop - start)
 
 
 @dataclass(frozen=True)
@@ -275,10 +274,9 @@ def light_of(backdrop: Backdrop, frame_count: int) -> Light:
     chosen = np.linspace(0, len(frames) - 1, min(LIGHT_FRAMES, len(frames))).round().astype(int)
     lights = []
     for index in sorted(set(chosen.tolist())):
-        with closing(opened.read(index, index + 1)) as pictures:  # type: ignore[type-var]
-            picture = next(pictures)
-        assert picture is not None  # options refuse to match with nothing
-        lights.append(measure_light(picture))
+        for picture in opened.read(index, index + 1):
+            assert picture is not None  # options refuse to match with nothing
+            lights.append(measure_light(picture))
     mean, deviation = (
         tuple(np.mean([getattr(light, name) for light in lights], axis=0).tolist())
         for name in ("mean", "deviation")

@@ -32,8 +32,9 @@ from motion_transfer.events import FramesDone, Listener, ignore
 from motion_transfer.media.output.segments import open_segment
 from motion_transfer.media.pictures.photo import read_photo, write_png
 from motion_transfer.render.backdrop import OpenBackdrop
-from motion_transfer.render.composition import Actor, Prepared
+from motion_transfer.render.composition import Prepared
 from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
+from motion_transfer.render.scene import Actor
 
 CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's batches are on the way
 

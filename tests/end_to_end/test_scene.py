@@ -112,6 +112,15 @@ def test_chunks_and_workers_never_show(studio) -> None:
     assert made[0] == made[1]
 
 
+def test_light_comes_from_what_is_behind(scene, studio) -> None:
+    dark = write_picture(studio.folder / "night.png", (96, 64), (10, 10, 30))
+    plain, lit = scene(background=dark), scene(background=dark, match_colours=True)
+    for before, after in zip(plain, lit, strict=True):
+        person = (before != (10, 10, 30)).any(-1)
+        assert after[person].mean() < before[person].mean() - 20
+        assert (after[~person] == before[~person]).all()
+
+
 def test_another_picture_behind_is_another_run(scene, studio) -> None:
     behind = studio.folder / "sky.png"
     write_picture(behind, (96, 64), BEHIND)
