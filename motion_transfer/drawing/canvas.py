@@ -70,10 +70,10 @@ def lay_over(frame: Picture, rgba: UInt8[np.ndarray, "h w 4"], x: int, y: int) -
     over, target, coverage = over[person], target[person], coverage[person]
     colour = over if frame.shape[2] == 4 else cv2.cvtColor(over, cv2.COLOR_RGBA2RGB)
     edge = np.nonzero(cv2.inRange(coverage, 1, 254))
-    weight = coverage[edge][:, None].astype(np.uint16)
     if frame.shape[2] == 4:
         blend = _blend_rgba(over[edge], target[edge])
     else:
+        weight = coverage[edge][:, None].astype(np.uint16)
         # + 127: rounds to the nearest level in whole numbers
         blend = (colour[edge] * weight + target[edge] * (255 - weight) + 127) // 255
     cv2.copyTo(colour, cv2.inRange(coverage, 255, 255), target)
@@ -204,9 +204,15 @@ def _lay_shadow(frame: Picture, figure: Figure) -> None:
     shade = cast_shadow(cv2.extractChannel(figure.rgba, 3), ground)
     if shade is None:
         return
-    black = np.zeros((window.side, 2 * window.side, 4), np.uint8)
-    black[..., 3] = cv2.resize(shade, black.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-    lay_over(frame, black, window.x - window.side // 2, window.y)
+    left, top, width, height = cv2.boundingRect(shade)
+    if not width:
+        return
+    scale = window.side / len(shade)
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    black = np.zeros((*size[::-1], 4), np.uint8)
+    black[..., 3] = cv2.resize(shade[top : top + height, left : left + width], size)
+    x = window.x - window.side // 2 + round(left * scale)
+    lay_over(frame, black, x, window.y + round(top * scale))
 
 
 def draw_over(

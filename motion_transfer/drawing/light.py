@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-SHADOW_PX = 256  # the side at which a shadow is made: it is soft
+SHADOW_PX = 128  # the side at which a shadow is made: it is soft
 
 # Of the light: from the front, from above and a little from the left, as in most photos.
 SHADOW_LENGTH = 0.14  # of a height above the ground: how much of it lies on the ground

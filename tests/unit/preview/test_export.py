@@ -26,7 +26,13 @@ CHANGES = [
     {"source_iuv": (Path("in/a b_IUV.png"),), "source_iuv_order": "vui", "missing": "hold"},
     {"source": (Path("in/front.png"), Path("in/me turning.mp4"))},
     {"background": "in/street at night.mp4", "size": "background", "background_blur": 1.5},
-    {"background": "transparent", "place": "0.5,0.9,1.5", "on_the_spot": True, "shadow": True},
+    {
+        "background": "transparent",
+        "place": "0.5,0.9,1.5",
+        "on_the_spot": True,
+        "shadow": True,
+        "output": Path("out/a.webm"),
+    },
     {
         "partners": (
             Partner(photo=Path("in/bob.png"), person="1"),
