@@ -1,6 +1,6 @@
 """Peak memory of whole runs, each in a process of its own, at two lengths.
 
-    python benchmarks/memory.py [--frames 300 3000] [--weights FILE]
+    python benchmarks/memory.py [--frames 300 3000] [--weights FILE] [--scene]
 
 Prints medians of the peak resident size and their ratio: it should be near 1. Single runs spread by
 a tenth and more, because threads share memory out differently each time.
@@ -15,15 +15,17 @@ import statistics
 import tempfile
 from pathlib import Path
 
+from scene import write_clip
 from workload import SOURCE, driver_folder
 
 
-def peak_mib(driver: Path, output: Path, weights: Path | None) -> float:
+def peak_mib(driver: Path, output: Path, weights: Path | None, behind: Path | None) -> float:
     """Run in a fresh process and report its peak resident size."""
     from motion_transfer import render_video
 
     renderer = "nhrr" if weights else "texture"
-    render_video(SOURCE, driver, output, renderer=renderer, weights=weights)
+    scene = {"background": behind, "shadow": True} if behind else {}
+    render_video(SOURCE, driver, output, renderer=renderer, weights=weights, **scene)
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
@@ -32,6 +34,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, nargs=2, default=(300, 3000))
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--weights", type=Path, help="measure nhrr instead of texture")
+    parser.add_argument("--scene", action="store_true", help="with a video of that length behind")
     arguments = parser.parse_args()
     peaks: dict[int, list[float]] = {count: [] for count in arguments.frames}
     with tempfile.TemporaryDirectory() as temporary:
@@ -39,7 +42,11 @@ def main() -> None:
         for index in range(arguments.rounds):
             for count in arguments.frames:
                 output = folder / f"{count}_{index}.mp4"
-                job = (driver_folder(folder, count), output, arguments.weights)
+                clip = folder / f"{count}.mp4"
+                if arguments.scene and not clip.exists():
+                    write_clip(clip, count)
+                behind = clip if arguments.scene else None
+                job = (driver_folder(folder, count), output, arguments.weights, behind)
                 with multiprocessing.get_context("spawn").Pool(1) as pool:
                     peaks[count].append(pool.apply(peak_mib, job))
     medians = [statistics.median(peaks[count]) for count in arguments.frames]

@@ -38,20 +38,14 @@ def write_posters(source: Path, output: Path, stem: Path) -> bool:
     """
     import cv2
 
-    from motion_transfer.media.pictures.photo import read_photo, write_png
-    from motion_transfer.media.pictures.video import IndexedVideo
+    from motion_transfer.media.pictures.formats import open_pictures
+    from motion_transfer.media.pictures.photo import write_png
     from motion_transfer.render.source_pictures import first_picture
 
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
-        if output.is_dir():
-            frames = sorted(output.iterdir())
-            middle = read_photo(frames[len(frames) // 2]).rgb
-        elif output.suffix in (".png", ".gif"):
-            middle = read_photo(output).rgb
-        else:
-            video = IndexedVideo(output)
-            middle = video.read(video.frame_count // 2)
+        pictures = open_pictures(output)
+        middle = next(pictures.play(pictures.frame_count // 2))()
         for name, rgb in zip(PICTURES, (first_picture(source), middle), strict=True):
             scale = min(1, POSTER_PX / max(rgb.shape[:2]))
             size = (max(1, round(rgb.shape[1] * scale)), max(1, round(rgb.shape[0] * scale)))
