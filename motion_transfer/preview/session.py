@@ -24,7 +24,7 @@ from motion_transfer.events import Event, FramesDone, Notice, Stage
 from motion_transfer.media.pictures.photo import encode_jpeg, encode_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import SCENES, list_options
+from motion_transfer.option import SCENES, list_options, parse_background
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.preview.dropped import DroppedFiles
 from motion_transfer.preview.export import command_line, manifest_text
@@ -49,6 +49,7 @@ from motion_transfer.render.inputs import (
 )
 from motion_transfer.render.options import (
     DEFAULT_RATE,
+    SIZES,
     RenderOptions,
     SceneOptions,
     is_kept,
@@ -59,7 +60,7 @@ from motion_transfer.render.source_pictures import first_picture
 
 CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's
 SCENE = tuple(entry.name for entry in list_options(SceneOptions) if entry.name != "partners")
-SHOWN_AS_IS = ("renderer", *SCENE, "person", "driver_person")
+SHOWN_AS_IS = ("renderer", *SCENE, "person", "driver_person", "size")
 CHANGEABLE = (*SHOWN_AS_IS, "window", "frames", "frame_rate")
 SHARP_VIEWS = ("iuv", "texture", "map", "features")
 """Edges in them mean something: they are sent without loss."""
@@ -132,7 +133,7 @@ class Session:
         """A digest of what pictures of frames depend on: it changes whenever one of them would."""
         o, plans = self.options, self.plans
         scene = [getattr(o, name) for name in SCENE]
-        drawn = (o.renderer, scene, o.sources, o.person, o.driver_person)
+        drawn = (o.renderer, scene, o.size, o.sources, o.person, o.driver_person)
         planned = plans and (plans.shots, plans.exact, plans.chosen)
         return hashlib.sha256(repr((drawn, planned)).encode()).hexdigest()[:12]
 
@@ -252,6 +253,8 @@ class Session:
         if "renderer" in parsed:  # weights go with the network, and come back with it
             row = RENDERERS.get(parsed["renderer"])  # an unknown one is refused with the others
             parsed["weights"] = self._weights if row and row.default_weights else None
+        if "background" in parsed:
+            parsed = {**_that_goes_with(parsed["background"], self.options), **parsed}
         changed = replace(self.options, **parsed)
         if "background" in words:
             self._check_background(changed)
@@ -294,7 +297,8 @@ class Session:
         backgrounds = self.backgrounds()
         if not 0 <= number < len(backgrounds):
             raise InputError(f"there is no background {number}")
-        options = replace(self.options, background=backgrounds[number])
+        plain = {"size": "driver", "match_colours": False}  # whatever the background is
+        options = replace(self.options, background=backgrounds[number], **plain)
         leads = self._numbers[0]
         return self._ask(
             ("background", options.background, leads, options.person),
@@ -402,7 +406,7 @@ class Session:
             options, driver, plans, source = self.options, self.driver, self.plans, self.source
             opened = driver and driver.opened
             broken = dict(driver.broken) if driver else {}  # a copy: others are writing to it
-            window = parse_window(options.window)
+            window, behind = parse_window(options.window), options.background_file
             rate = options.frame_rate or (opened and opened.frame_rate) or DEFAULT_RATE
             # of raw pictures one person is left
             in_driver = driver.most_people if driver and not driver.opened.pictures else 0
@@ -419,6 +423,7 @@ class Session:
                     "renderer": list(RENDERERS),
                     "person": _whom(self.source_people, options.person),
                     "driver_person": _whom(in_driver, options.driver_person),
+                    "size": [each for each in SIZES if each != "background" or behind],
                 },
                 "backgrounds": [
                     {"value": value, "name": Path(value).name} for value in self.backgrounds()
@@ -561,6 +566,16 @@ def _name_some(names: list[str]) -> str:
 def _whom(count: int, current: str) -> list[str]:
     """List whom one can choose: the largest, each of some people, and the present choice."""
     return list(dict.fromkeys(["largest", *map(str, range(count)), current]))
+
+
+def _that_goes_with(background: str, options: RenderOptions) -> dict[str, Any]:
+    """Give up what another background cannot have."""
+    given_up: dict[str, Any] = {}
+    if options.size == "background" and not isinstance(parse_background(background), Path):
+        given_up["size"] = "driver"
+    if background == "transparent":
+        given_up["match_colours"] = False
+    return given_up
 
 
 def _named_files(options: RenderOptions) -> list[Path]:

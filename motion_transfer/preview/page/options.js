@@ -8,6 +8,10 @@ const WORDS = {
   nhrr: "nhrr (network)",
   texture: "texture (draft)",
   largest: "largest",
+  driver: "as the driver",
+  crop: "around the person",
+  even: "as the driver, even",
+  background: "as the background",
 };
 
 /** Returns choose(changes), which posts options and shows what the server says to them. */
@@ -22,7 +26,7 @@ export function setUpOptions(looking) {
   // One after the other: two that overtake each other would leave the older one standing.
   let last = Promise.resolve();
   const choose = (changes) => (last = last.then(() => send(changes)));
-  for (const option of ["renderer", "person", "driver_person"]) {
+  for (const option of ["renderer", "person", "driver_person", "size"]) {
     byId(option).addEventListener("change", (event) => choose({ [option]: event.target.value }));
   }
   setUpRange(looking, choose);
@@ -60,7 +64,7 @@ export function setOut(looking, choose) {
 
 function showOptions(looking) {
   const { options, choices } = looking.state;
-  for (const name of ["renderer", "person", "driver_person"]) {
+  for (const name of ["renderer", "person", "driver_person", "size"]) {
     fill(byId(name), choices[name] ?? [], options[name]);
   }
   showRange(looking);

@@ -28,13 +28,14 @@ from motion_transfer.render.options.inputs import (
     parse_window,
     read_garment,
 )
-from motion_transfer.render.options.outputs import NO_AUDIO, OutputOptions
+from motion_transfer.render.options.outputs import NO_AUDIO, SIZES, OutputOptions
 from motion_transfer.render.options.scene import Partner, SceneOptions
 
 __all__ = [
     "DEFAULT_RATE",
     "KEPT_SUFFIX",
     "NO_AUDIO",
+    "SIZES",
     "AdaptOptions",
     "DriverOptions",
     "EstimatorOptions",
