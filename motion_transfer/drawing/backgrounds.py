@@ -13,6 +13,7 @@ from motion_transfer.option import parse_colour
 PERSON_GROWTH = 0.05  # of the person's height: hair and clothes reach beyond the IUV by about that
 ALPHA_GROWTH = 0.02  # likewise, where alpha shows them: single hairs and their shadow
 FAINT_ALPHA = 32  # of 255; less is noise of whoever made the alpha
+GROWN_PX = 512  # the longer side at which that is done
 FILL_PX = 512  # the fill is smooth: at that longer side nothing is lost, and much time saved
 
 Frame = UInt8[np.ndarray, "H W 3"]
@@ -85,10 +86,16 @@ def person_area(
     growth = PERSON_GROWTH
     if alpha is not None:
         mask, growth = mask | (alpha >= FAINT_ALPHA).astype(np.uint8), ALPHA_GROWTH
-    rows = np.flatnonzero(mask.any(1))
-    if not rows.size:
+    _, _, _, height = cv2.boundingRect(mask)
+    if not height:
         return mask
-    return cv2.dilate(mask, disc(max(2, (rows[-1] - rows[0] + 1) * growth)))
+    # a large disc takes long, and its outline need not be exact
+    scale = min(1, GROWN_PX / max(mask.shape))
+    size = max(1, round(mask.shape[1] * scale)), max(1, round(mask.shape[0] * scale))
+    small = cv2.resize(mask * np.uint8(255), size, interpolation=cv2.INTER_AREA)
+    grown = cv2.dilate(small, disc(max(2, height * growth) * scale))
+    whole = cv2.resize(grown, mask.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    return mask | (whole > 0).astype(np.uint8)
 
 
 def fill_from_around(picture: Frame, hole: UInt8[np.ndarray, "H W"]) -> Frame:

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import UInt8
 
 from motion_transfer.drawing.backgrounds import (
     Frame,
@@ -336,7 +336,11 @@ def _take_out(picture: Frame, area: UInt8[np.ndarray, "H W"], plate: Frame | Non
     if plate is None:
         return fill_from_around(picture, area)
     width = max(0.5, picture.shape[0] * FEATHER)
-    weight = cv2.GaussianBlur(area.astype(np.float32), (0, 0), width)[..., None]
-    inside: Bool[np.ndarray, "H W 1"] = weight > 0
-    mixed = picture + (plate.astype(np.float32) - picture) * weight
-    return np.where(inside, mixed.round(), picture).astype(np.uint8)
+    x, y, columns, rows = cv2.boundingRect(area)
+    room = int(4 * width) + 1
+    around = np.s_[max(0, y - room) : y + rows + room, max(0, x - room) : x + columns + room]
+    weight = cv2.GaussianBlur(area[around].astype(np.float32), (0, 0), width)[..., None]
+    emptied = picture.copy()
+    before = picture[around]
+    emptied[around] = (before + (plate[around].astype(np.float32) - before) * weight).round()
+    return emptied
