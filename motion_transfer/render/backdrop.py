@@ -195,9 +195,11 @@ def open_background(path: Path) -> PictureStream:
             f"background {path} does not exist; name a picture or a video, or write white, black,"
             f" #rrggbb, {', '.join(SCENES)}"
         )
-    if not path.is_dir():
-        check_readable(path, "background")
-    return open_pictures(path)
+    check_readable(path, "background", folder=True)
+    try:
+        return open_pictures(path)
+    except InputError as error:  # which begins with the path
+        raise InputError(f"background {error}") from error
 
 
 def count_until_end(options: SceneOptions, rate: Fraction) -> int | None:

@@ -129,8 +129,10 @@ def compose(
 def check_early(options: RenderOptions) -> None:
     """Refuse what can be refused at once: to find people may take long. Raises: InputError."""
     read_format(options)
-    for member in options.cast:
-        check_photos(member)
+    check_photos(options)
+    for partner in options.partners:
+        if not partner.photo.exists():
+            raise InputError(f"partner {partner.photo} does not exist")
     if options.background_file is not None:
         open_background(options.background_file)
 

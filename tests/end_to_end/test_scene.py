@@ -14,7 +14,7 @@ from PIL import Image
 from skimage import data
 
 from motion_transfer import Partner, render_video
-from motion_transfer.errors import InputError
+from motion_transfer.errors import InputError, MotionTransferError
 from motion_transfer.events import Notice
 from motion_transfer.media.pictures.formats import open_pictures
 
@@ -281,3 +281,32 @@ def test_a_camera_that_moves_is_told(scene, studio, red_model: Path) -> None:
     red = [(np.abs(frame.astype(int) - RED).sum(-1) < 60).sum() for frame in frames]
     # what is left of it is the drawn person's, whose photo has no such red
     assert max(red) < 20
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"background": "gone.png"}, r"background gone\.png does not exist; name a picture"),
+        ({"background": __file__}, r"background .*test_scene\.py is neither a picture nor a video"),
+        ({"background": "transparent"}, r"out\.mp4 cannot hold transparency; \.mov, \.mkv"),
+        ({"alpha": "premultiplied"}, r"--alpha premultiplied means nothing; leave it out"),
+        ({"background": "transparent", "compare": True}, r"--compare shows panels"),
+        (
+            {"partners": [Partner(photo=Path("gone.png"), person="1")]},
+            r"partner gone\.png does not",
+        ),
+        (
+            {"partners": [Partner(photo=Path("a.png"), person="largest")]},
+            r"name whose motion it is",
+        ),
+        ({"pix_fmt": "yuv999p"}, r"pix-fmt"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_is_drawn(
+    scene, studio, words: dict, message: str
+) -> None:
+    with pytest.raises(MotionTransferError, match=message) as refused:
+        scene("out.mp4", codec=None, **words)
+    assert "\n" not in str(refused.value)
+    assert not (studio.folder / "out.mp4").exists()
+    assert not list(studio.folder.glob(".*"))

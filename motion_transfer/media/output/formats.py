@@ -196,7 +196,8 @@ def _check_alpha(output: Path, row: OutputKind, *, transparent: bool, alpha: str
     if not transparent:
         if alpha != "straight":
             raise OutputError(
-                f"{output} is not to be transparent, so that nothing can be {alpha}; leave it out"
+                f"{output} is not to be transparent, so that --alpha {alpha} means nothing; leave"
+                " it out, or add --background transparent"
             )
         return
     container = CONTAINERS.get(output.suffix.lower())
