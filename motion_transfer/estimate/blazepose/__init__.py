@@ -31,6 +31,7 @@ from motion_transfer.estimate.models import (
     find_model,
 )
 from motion_transfer.estimate.surfaces.hand_drawing import hand_room, lay_hand
+from motion_transfer.estimate.surfaces.head_drawing import lay_head
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -111,7 +112,9 @@ class BlazePoseEstimator:
         box = _box_on_frame(body, height, width, FAINT)
         if box is None:
             return None
-        for points in details.values():
+        face = details.get("face")
+        hands = {side: details[side] for side in details if side != "face"}
+        for points in hands.values():
             box = hand_room(points, box, height, width)
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
         # the network shrinks the mask to its own size: no need to see it much finer
@@ -119,7 +122,9 @@ class BlazePoseEstimator:
         features = body.features.look(_into(window)) if body.features else None
         (painted,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
         iuv = paint_iuv(*read_painted(painted), window, box)
-        for side, points in details.items():
+        if face is not None:
+            lay_head(iuv, box, face)
+        for side, points in hands.items():
             lay_hand(iuv, box, side, points, body.landmarks)
         return PersonEstimate(
             track=number,

@@ -15,6 +15,7 @@ from threading import Lock
 import numpy as np
 from jaxtyping import Float32, UInt8
 
+from motion_transfer.estimate.blazepose.faces import find_face
 from motion_transfer.estimate.blazepose.hands import find_hands
 from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit
@@ -79,7 +80,11 @@ class DetailsInFrame:
 def _find_details(
     frame: UInt8[np.ndarray, "H W 3"], people: Sequence[tuple[int, SeenBody]]
 ) -> dict[int, Details]:
-    return {number: find_hands(frame, body.landmarks) for number, body in people}
+    found: dict[int, Details] = {}
+    for number, body in people:
+        face = find_face(frame, body.landmarks)
+        found[number] = ({} if face is None else {"face": face}) | find_hands(frame, body.landmarks)
+    return found
 
 
 ANCHORS: dict[str, tuple[str, str]] = {
