@@ -18,7 +18,14 @@ from motion_transfer.estimate.blazepose.networks import LandmarkModel, PersonDet
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
 from motion_transfer.estimate.inference import CpuNetwork
-from motion_transfer.estimate.interface import AT_ONCE, Finish, PersonEstimate, check_frame
+from motion_transfer.estimate.interface import (
+    AT_ONCE,
+    LANDMARK,
+    SIDES,
+    Finish,
+    PersonEstimate,
+    check_frame,
+)
 from motion_transfer.estimate.iuv.body import MASK_SIZE, body_arrays, body_window
 from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
@@ -113,7 +120,10 @@ class BlazePoseEstimator:
         if box is None:
             return None
         face = details.get("face")
-        hands = {side: details[side] for side in details if side != "face"}
+        sides = [side for side in SIDES if side in details]
+        # the farther one first
+        sides.sort(key=lambda side: -body.landmarks.image[LANDMARK[f"{side}-wrist"], 2])
+        hands = {side: details[side] for side in sides}
         for points in hands.values():
             box = hand_room(points, box, height, width)
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))

@@ -8,7 +8,7 @@ frames before, too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from threading import Lock
 
@@ -20,13 +20,35 @@ from motion_transfer.estimate.blazepose.hands import find_hands
 from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit
 from motion_transfer.estimate.blazepose.tracker import OneEuroFilter
-from motion_transfer.estimate.interface import LANDMARK, Landmarks
+from motion_transfer.estimate.interface import LANDMARK, SIDES, Landmarks
 
 Details = dict[str, Float32[np.ndarray, "N 3"]]
 Filters = dict[tuple[int, str], OneEuroFilter]
 
 SMOOTHING = (1.0, 20.0)
 """Cut-off and gain of a `OneEuroFilter`, the size being the detail's own."""
+
+
+ANCHORS: dict[str, tuple[str, str]] = {
+    "left": ("left-wrist", "lower-arm"),
+    "right": ("right-wrist", "lower-arm"),
+    "face": ("nose", "head"),
+}
+"""The landmark that a detail hangs on, and the bone whose scale is its own."""
+
+FOLLOWED = {
+    **{
+        side: [LANDMARK[f"{side}-{name}"] for name in ("wrist", "index", "pinky")] for side in SIDES
+    },
+    "face": list(range(LANDMARK["mouth-right"] + 1)),
+}
+"""The landmarks whose mean a detail moves with."""
+
+TURNS = (("left", "face"), ("right",))
+"""What is looked at in turns, frame by frame; the rest moves along with the body meanwhile."""
+
+MOST_SECONDS = 1 / 20
+"""Between frames that take turns; farther apart all details are looked at in each frame."""
 
 
 class DetailsInFrame:
@@ -44,9 +66,17 @@ class DetailsInFrame:
         before: DetailsInFrame | None,
         seconds: float | None,
     ) -> None:
-        self._find = partial(_find_details, frame, people)
         self._before = before if seconds else None
         self._seconds = seconds
+        self._landmarks = {number: body.landmarks for number, body in people}
+        takes_turns = self._before is not None and seconds is not None and seconds <= MOST_SECONDS
+        self._turn = (self._before._turn + 1) % len(TURNS) if self._before and takes_turns else 0
+        known = self._before._landmarks if self._before and takes_turns else {}
+        self._names = {
+            number: TURNS[self._turn] if number in known else tuple(ANCHORS)
+            for number in self._landmarks
+        }
+        self._find = partial(_find_details, frame, self._landmarks, self._names)
         self._lock = Lock()
         self._found: dict[int, Details] | None = None
         self._filters: Filters = {}
@@ -57,7 +87,7 @@ class DetailsInFrame:
             if self._found is None:
                 found = self._find()
                 if self._before is not None:
-                    self._before.work_out()
+                    found = self._take_along(found, self._before.work_out(), self._before)
                     self._filters = self._before._filters
                 if self._seconds:
                     found = self._smooth(found, self._seconds)
@@ -65,6 +95,21 @@ class DetailsInFrame:
                 # nobody asks for frames and details of the past any more
                 self._find, self._before = dict, None
             return self._found
+
+    def _take_along(
+        self, found: dict[int, Details], earlier: dict[int, Details], before: DetailsInFrame
+    ) -> dict[int, Details]:
+        """Add what was not looked at: where it was, moved as the body's landmarks there did."""
+        for number, details in found.items():
+            for name, points in earlier.get(number, {}).items():
+                if name not in self._names[number]:
+                    moved = points.copy()
+                    new, old = (
+                        each._landmarks[number].image[FOLLOWED[name], :2] for each in (self, before)
+                    )
+                    moved[:, :2] += (new - old).mean(0)
+                    details[name] = moved
+        return found
 
     def _smooth(self, found: dict[int, Details], seconds: float) -> dict[int, Details]:
         # one that was not seen in the frame before begins anew
@@ -78,21 +123,18 @@ class DetailsInFrame:
 
 
 def _find_details(
-    frame: UInt8[np.ndarray, "H W 3"], people: Sequence[tuple[int, SeenBody]]
+    frame: UInt8[np.ndarray, "H W 3"],
+    landmarks: Mapping[int, Landmarks],
+    names: Mapping[int, Sequence[str]],
 ) -> dict[int, Details]:
+    """Find some details of each person."""
     found: dict[int, Details] = {}
-    for number, body in people:
-        face = find_face(frame, body.landmarks)
-        found[number] = ({} if face is None else {"face": face}) | find_hands(frame, body.landmarks)
+    for number, marks in landmarks.items():
+        wanted = names[number]
+        found[number] = find_hands(frame, marks, [side for side in SIDES if side in wanted])
+        if "face" in wanted and (face := find_face(frame, marks)) is not None:
+            found[number]["face"] = face
     return found
-
-
-ANCHORS: dict[str, tuple[str, str]] = {
-    "left": ("left-wrist", "lower-arm"),
-    "right": ("right-wrist", "lower-arm"),
-    "face": ("nose", "head"),
-}
-"""The landmark that a detail hangs on, and the bone whose scale is its own."""
 
 
 def fit_details(details: Details, seen: Landmarks, fitted: Landmarks, fit: BodyFit) -> Details:

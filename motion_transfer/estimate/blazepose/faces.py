@@ -102,7 +102,8 @@ def first_region(landmarks: Landmarks) -> Region:
         *(hypot(*down), hypot(*across), 0.6 * hypot(*ahead)),
         0.45 * hypot(*(places["left-ear"] - places["right-ear"])),
     )
-    x, y = down + (-across[1], across[0])  # eyes lie across, and in profile the mouth still below
+    # eyes lie across; in profile the mouth still lies below
+    x, y = down + np.array([-across[1], across[0]])
     middle = (eyes + mouth) / 2
     return Region(
         float(middle[0]), float(middle[1]), FIRST_CROP * size, atan2(float(y), float(x)) - pi / 2

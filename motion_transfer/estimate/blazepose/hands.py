@@ -7,6 +7,7 @@ numbers are those of MediaPipe's graphs `hand_landmarks_from_pose_to_recrop_roi`
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from math import atan2, hypot, pi
 
@@ -15,7 +16,7 @@ from jaxtyping import Float32, UInt8
 
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.inference import CpuNetwork
-from motion_transfer.estimate.interface import AT_ONCE, LANDMARK, Landmarks
+from motion_transfer.estimate.interface import AT_ONCE, LANDMARK, SIDES, Landmarks
 from motion_transfer.estimate.models import HAND_CROPPER, HAND_LANDMARKER, find_model
 
 POINT_COUNT = 21
@@ -93,14 +94,12 @@ def open_hand_model() -> HandModel:
 
 
 def find_hands(
-    frame: UInt8[np.ndarray, "H W 3"], landmarks: Landmarks
+    frame: UInt8[np.ndarray, "H W 3"], landmarks: Landmarks, sides: Sequence[str] = SIDES
 ) -> dict[str, Float32[np.ndarray, "21 3"]]:
-    """Find the hands of somebody whose landmarks are known, the farther one first."""
+    """Find the hands of somebody whose landmarks are known."""
     model = open_hand_model()
-    found = {side: model.find(frame, landmarks, side) for side in ("left", "right")}
-    hands = {side: points for side, points in found.items() if points is not None}
-    far = {side: landmarks.image[LANDMARK[f"{side}-wrist"], 2] for side in hands}
-    return dict(sorted(hands.items(), key=lambda hand: -far[hand[0]]))
+    found = {side: model.find(frame, landmarks, side) for side in sides}
+    return {side: points for side, points in found.items() if points is not None}
 
 
 def first_region(wrist: np.ndarray, index: np.ndarray, pinky: np.ndarray) -> Region:

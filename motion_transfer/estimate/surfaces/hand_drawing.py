@@ -69,10 +69,13 @@ def clear(iuv: UInt8[np.ndarray, "h w 3"], where: Bool[np.ndarray, "h w"]) -> No
     if where.all():
         iuv[:] = 0
         return
-    _, nearest = cv2.distanceTransformWithLabels(
-        where.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    x, y, width, height = cv2.boundingRect(where.view(np.uint8))
+    near = np.s_[max(0, y - 1) : y + height + 1, max(0, x - 1) : x + width + 1]
+    iuv, where = iuv[near], where[near]
+    _, labels = cv2.distanceTransformWithLabels(
+        where.view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    nearest = np.asarray(nearest, np.int32)
+    nearest = np.asarray(labels, np.int32)
     value = np.zeros((int(nearest.max()) + 1, 3), np.uint8)
     value[nearest[~where]] = iuv[~where]
     iuv[where] = value[nearest[where]]

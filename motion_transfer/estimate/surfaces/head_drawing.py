@@ -14,17 +14,14 @@ from motion_transfer.estimate.surfaces.hand_drawing import (
 )
 from motion_transfer.estimate.surfaces.head_surface import load_head
 
-RIGHT, LEFT = 23, 24
-UNDER_HEAD = (0, 1, 2, RIGHT, LEFT)
-"""Parts that a head whose face is seen hides: arms and hands before it stay."""
+RIGHT = 23  # the head's first part
+TRUNK = 2  # the last part of the trunk; 0 is nobody
 
 AROUND = 0.6  # of the drawn head's size: so far around it, what was painted of it is its own
 NECK_METRES = 0.085  # below the head's middle; what was painted there is the neck's, and stays
 
 
-def lay_head(
-    iuv: UInt8[np.ndarray, "h w 3"], box: Box, seen: Float32[np.ndarray, "468 3"]
-) -> None:
+def lay_head(iuv: UInt8[np.ndarray, "h w 3"], box: Box, seen: Float32[np.ndarray, "468 3"]) -> None:
     """Draw a head in place of what was painted of it, in `iuv` itself; hair is not the head's.
 
     Args:
@@ -41,8 +38,10 @@ def lay_head(
     here = iuv[
         place.top - box.top : place.bottom - box.top, place.left - box.left : place.right - box.left
     ]
-    shown = (drawn[..., 0] > 0) & np.isin(here[..., 0], UNDER_HEAD)
-    clear(here, (here[..., 0] >= RIGHT) & ~_below(place, middle, turn, scale))
+    part = here[..., 0]
+    # arms and hands before the face stay
+    shown = (drawn[..., 0] > 0) & ((part <= TRUNK) | (part >= RIGHT))
+    clear(here, (part >= RIGHT) & ~_below(place, middle, turn, scale))
     np.copyto(here, drawn, where=shown[..., None])
 
 
