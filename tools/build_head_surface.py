@@ -79,6 +79,9 @@ def grid_surface() -> dict[str, np.ndarray]:
                     faces.append(np.array(face) + len(points) * RINGS * SPOKES)
                     parts.append(part)
                     uv.append(place[face])
+        found[-SPOKES:, 0] = 0  # both halves meet there, without a gap
+        if points:
+            found[-SPOKES:] = points[0][-SPOKES:]
         points.append(found)
     used, local = np.unique(faces, return_inverse=True)
     return {

@@ -28,7 +28,7 @@ second crop comes to on synthetic people."""
 
 CROP = 1.5  # times the points' own extent
 
-LEAST_PRESENCE = 0.9
+LEAST_PRESENCE = 0.95
 """Chance that a face is there. Measured: of synthetic people who look at the camera, or past it by
 less than 60 degrees, nearly all have more; of those seen from behind or beyond the profile none."""
 
