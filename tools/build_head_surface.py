@@ -40,7 +40,8 @@ def main() -> None:
     options = parser.parse_args()
     surface = grid_surface()
     marks = measure_marks(options.people, options.assets)
-    np.savez_compressed(options.out, marks=marks.astype(np.float32), **surface)
+    with options.out.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, marks=marks.astype(np.float32), **surface)
     size = options.out.stat().st_size
     print(f"{options.out}: {len(surface['faces'])} triangles, {size} bytes")
 
