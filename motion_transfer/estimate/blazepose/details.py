@@ -51,6 +51,11 @@ MOST_SECONDS = 1 / 20
 """Between frames that take turns; farther apart all details are looked at in each frame."""
 
 
+LOOKS_MISSED = 2
+"""So many looks in a row may see no face where one was before: it moves along meanwhile, as fast
+heads blur, and heads that lose and find their direction flicker."""
+
+
 class DetailsInFrame:
     """The details of everybody in a frame; threads may share it.
 
@@ -72,6 +77,7 @@ class DetailsInFrame:
         takes_turns = self._before is not None and seconds is not None and seconds <= MOST_SECONDS
         self._turn = (self._before._turn + 1) % len(TURNS) if self._before and takes_turns else 0
         known = self._before._landmarks if self._before and takes_turns else {}
+        self._known = known.keys()
         self._names = {
             number: TURNS[self._turn] if number in known else tuple(ANCHORS)
             for number in self._landmarks
@@ -79,6 +85,7 @@ class DetailsInFrame:
         self._find = partial(_find_details, frame, self._landmarks, self._names)
         self._lock = Lock()
         self._found: dict[int, Details] | None = None
+        self._missed: dict[int, int] = {}  # looks since a face was seen
         self._filters: Filters = {}
 
     def work_out(self) -> dict[int, Details]:
@@ -99,10 +106,15 @@ class DetailsInFrame:
     def _take_along(
         self, found: dict[int, Details], earlier: dict[int, Details], before: DetailsInFrame
     ) -> dict[int, Details]:
-        """Add what was not looked at: where it was, moved as the body's landmarks there did."""
+        """Add what was not looked at, and faces that were just seen: where they were, moved as the
+        body's landmarks there did."""
         for number, details in found.items():
             for name, points in earlier.get(number, {}).items():
-                if name not in self._names[number]:
+                due = name in self._names[number]
+                if name == "face" and name not in details:
+                    self._missed[number] = before._missed.get(number, 0) + due
+                    due = self._missed[number] > LOOKS_MISSED or number not in self._known
+                if not due:
                     moved = points.copy()
                     new, old = (
                         each._landmarks[number].image[FOLLOWED[name], :2] for each in (self, before)

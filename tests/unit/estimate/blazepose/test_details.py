@@ -79,6 +79,24 @@ def test_details_take_turns_and_move_along_meanwhile(looked: list) -> None:
     assert (second["right"] - first["right"]).max() <= 1
 
 
+def test_a_face_that_is_missed_moves_along_for_a_while(
+    looked: list, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find = details._find_details
+
+    def miss(frame: np.ndarray, landmarks: Any, names: Any) -> Any:
+        found = find(frame, landmarks, names)
+        if frame.any():
+            for each in found.values():
+                each.pop("face", None)
+        return found
+
+    monkeypatch.setattr(details, "_find_details", miss)
+    shown = ["face" in one.work_out()[0] for one in chain([0, 1, 2, 3, 4, 5, 6, 7], SECONDS)]
+    assert shown == [True] * 6 + [False] * 2  # it was looked for in every other frame
+    assert ["face" in one.work_out()[0] for one in chain([0, 1, 2])] == [True, False, False]
+
+
 def test_who_is_new_is_looked_at_all_over(looked: list) -> None:
     first = DetailsInFrame(frame(0), [(0, body_at(0))], None, SECONDS)
     second = DetailsInFrame(frame(1), [(0, body_at(0)), (7, body_at(9))], first, SECONDS)
