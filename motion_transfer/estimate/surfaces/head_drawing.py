@@ -18,8 +18,8 @@ RIGHT = 23  # the head's first part
 TRUNK = 2  # the last part of the trunk; 0 is nobody
 
 LEAST_AHEAD = 0.64
-"""Cosine of the angle by which a head may look past the camera. Measured: the face network sees turns
-smaller than they are, and beyond 50 degrees heads are painted better than they are drawn."""
+"""Cosine of the angle by which a head may look past the camera. Measured: the face network sees
+turns smaller than they are, and beyond 50 degrees heads are painted better than they are drawn."""
 
 AROUND = 0.6  # of the drawn head's size: so far around it, what was painted of it is its own
 NECK_METRES = 0.085  # below the head's middle; what was painted there is the neck's, and stays
