@@ -54,7 +54,7 @@ class FaceModel:
         """
         region, points = first_region(landmarks), None
         for _ in range(2):  # where the first look's points are one sees better
-            if not region.is_usable or region.side < LEAST_CROP or not _is_in(region, frame):
+            if not region.is_usable or region.side < LEAST_CROP or not region.has_middle_in(frame):
                 return None
             points = self._look(frame, region)
             if points is None:
@@ -119,8 +119,3 @@ def next_region(points: Float32[np.ndarray, "468 3"]) -> Region:
     middle = upright.rotate((low + high)[None] / 2)[0]
     side = CROP * float((high - low).max())
     return Region(float(middle[0]), float(middle[1]), side, upright.turn)
-
-
-def _is_in(region: Region, frame: np.ndarray) -> bool:
-    height, width = frame.shape[:2]
-    return 0 <= region.x < width and 0 <= region.y < height

@@ -64,7 +64,7 @@ class HandModel:
         if (landmarks.visibility[rows] < SURE).any():
             return None
         region = first_region(*landmarks.image[rows, :2])
-        if region.side < FIRST_CROP * LEAST_SIZE or not _is_in(region, frame):
+        if region.side < FIRST_CROP * LEAST_SIZE or not region.has_middle_in(frame):
             return None
         region = self._crop(frame, region)
         if not region.is_usable:
@@ -117,8 +117,3 @@ def _region(middle: np.ndarray, up: np.ndarray, scale: float) -> Region:
     region = Region(float(middle[0]), float(middle[1]), side, turn)
     ahead = region.to_frame(np.array([[0.5, 0.5 - TOWARDS_TIPS]], np.float32))[0]
     return Region(float(ahead[0]), float(ahead[1]), side, turn)
-
-
-def _is_in(region: Region, frame: np.ndarray) -> bool:
-    height, width = frame.shape[:2]
-    return 0 <= region.x < width and 0 <= region.y < height
