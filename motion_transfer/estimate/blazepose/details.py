@@ -21,6 +21,7 @@ from motion_transfer.estimate.blazepose.networks import SeenBody
 from motion_transfer.estimate.blazepose.retarget import BodyFit
 from motion_transfer.estimate.blazepose.tracker import OneEuroFilter
 from motion_transfer.estimate.interface import LANDMARK, SIDES, Landmarks
+from motion_transfer.estimate.surfaces.head_surface import load_head
 
 Details = dict[str, Float32[np.ndarray, "N 3"]]
 Filters = dict[tuple[int, str], OneEuroFilter]
@@ -54,6 +55,10 @@ MOST_SECONDS = 1 / 20
 LOOKS_MISSED = 2
 """So many looks in a row may see no face where one was before: it moves along meanwhile, as fast
 heads blur, and heads that lose and find their direction flicker."""
+
+LEAST_AHEAD = 0.64
+"""Cosine of the angle, 50 degrees, by which a face that is missed may have looked past the camera:
+one that looked farther away has likely turned, and is not held."""
 
 
 class DetailsInFrame:
@@ -112,8 +117,10 @@ class DetailsInFrame:
             for name, points in earlier.get(number, {}).items():
                 due = name in self._names[number]
                 if name == "face" and name not in details:
-                    self._missed[number] = before._missed.get(number, 0) + due
-                    due = self._missed[number] > LOOKS_MISSED or number not in self._known
+                    missed = before._missed.get(number, 0) + due
+                    given_up = missed > LOOKS_MISSED or number not in self._known
+                    self._missed[number] = missed
+                    due = given_up or (missed > 0 and _looks_aside(points))
                 if not due:
                     moved = points.copy()
                     new, old = (
@@ -132,6 +139,11 @@ class DetailsInFrame:
             size = max(1.0, float(np.ptp(points[:, :2], axis=0).max()))
             found[person][name] = self._filters[person, name](points, seconds, size)
         return found
+
+
+def _looks_aside(face: Float32[np.ndarray, "468 3"]) -> bool:
+    _, turn, _ = load_head().fit(face)
+    return bool(turn[2, 2] < LEAST_AHEAD)
 
 
 def _find_details(

@@ -17,10 +17,6 @@ from motion_transfer.estimate.surfaces.head_surface import load_head
 RIGHT = 23  # the head's first part
 TRUNK = 2  # the last part of the trunk; 0 is nobody
 
-LEAST_AHEAD = 0.64
-"""Cosine of the angle by which a head may look past the camera. Measured: the face network sees
-turns smaller than they are, and beyond 50 degrees heads are painted better than they are drawn."""
-
 AROUND = 0.6  # of the drawn head's size: so far around it, what was painted of it is its own
 NECK_METRES = 0.085  # below the head's middle; what was painted there is the neck's, and stays
 
@@ -28,16 +24,12 @@ NECK_METRES = 0.085  # below the head's middle; what was painted there is the ne
 def lay_head(iuv: UInt8[np.ndarray, "h w 3"], box: Box, seen: Float32[np.ndarray, "468 3"]) -> None:
     """Draw a head in place of what was painted of it, in `iuv` itself; hair is not the head's.
 
-    One that looks far past the camera stays as it is.
-
     Args:
         box: Of the frame; where `iuv` lies.
         seen: The face's points; frame pixels, depth included.
     """
     surface = load_head()
     scale, turn, middle = surface.fit(seen)
-    if turn[2, 2] < LEAST_AHEAD:
-        return
     points = (scale * surface.points @ turn.T + middle).astype(np.float32)
     place = within(box_of(points, AROUND), box)
     if place is None:

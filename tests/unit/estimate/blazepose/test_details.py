@@ -92,9 +92,13 @@ def test_a_face_that_is_missed_moves_along_for_a_while(
         return found
 
     monkeypatch.setattr(details, "_find_details", miss)
+    monkeypatch.setattr(details, "_looks_aside", lambda _face: False)
     shown = ["face" in one.work_out()[0] for one in chain([0, 1, 2, 3, 4, 5, 6, 7], SECONDS)]
     assert shown == [True] * 6 + [False] * 2  # it was looked for in every other frame
     assert ["face" in one.work_out()[0] for one in chain([0, 1, 2])] == [True, False, False]
+    monkeypatch.setattr(details, "_looks_aside", lambda _face: True)
+    shown = ["face" in one.work_out()[0] for one in chain([0, 1, 2, 3], SECONDS)]
+    assert shown == [True, False, False, False]
 
 
 def test_who_is_new_is_looked_at_all_over(looked: list) -> None:

@@ -74,12 +74,6 @@ def test_a_turned_head_shows_more_of_one_side() -> None:
     assert right > 2 * left
 
 
-def test_a_profile_stays_painted() -> None:
-    iuv = painted()
-    lay_head(iuv, WHOLE, seen(-60))
-    assert np.array_equal(iuv, painted())
-
-
 def test_hands_before_the_face_stay() -> None:
     iuv = painted()
     iuv[90:110, 90:110] = HAND
