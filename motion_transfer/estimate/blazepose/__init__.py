@@ -18,7 +18,14 @@ from motion_transfer.estimate.blazepose.networks import LandmarkModel, PersonDet
 from motion_transfer.estimate.blazepose.retarget import BodyFit, fit_body
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
 from motion_transfer.estimate.inference import CpuNetwork
-from motion_transfer.estimate.interface import AT_ONCE, Finish, PersonEstimate, check_frame
+from motion_transfer.estimate.interface import (
+    AT_ONCE,
+    LANDMARK,
+    SIDES,
+    Finish,
+    PersonEstimate,
+    check_frame,
+)
 from motion_transfer.estimate.iuv.body import MASK_SIZE, body_arrays, body_window
 from motion_transfer.estimate.iuv.graph import build_graph, read_painted
 from motion_transfer.estimate.iuv.painting import paint_iuv
@@ -31,6 +38,7 @@ from motion_transfer.estimate.models import (
     find_model,
 )
 from motion_transfer.estimate.surfaces.hand_drawing import hand_room, lay_hand
+from motion_transfer.estimate.surfaces.head_drawing import lay_head
 
 __all__ = ["BlazePoseEstimator", "model_facts"]
 
@@ -111,7 +119,12 @@ class BlazePoseEstimator:
         box = _box_on_frame(body, height, width, FAINT)
         if box is None:
             return None
-        for points in details.values():
+        face = details.get("face")
+        sides = [side for side in SIDES if side in details]
+        # the farther one first
+        sides.sort(key=lambda side: -body.landmarks.image[LANDMARK[f"{side}-wrist"], 2])
+        hands = {side: details[side] for side in sides}
+        for points in hands.values():
             box = hand_room(points, box, height, width)
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
         # the network shrinks the mask to its own size: no need to see it much finer
@@ -119,7 +132,9 @@ class BlazePoseEstimator:
         features = body.features.look(_into(window)) if body.features else None
         (painted,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
         iuv = paint_iuv(*read_painted(painted), window, box)
-        for side, points in details.items():
+        if face is not None:
+            lay_head(iuv, box, face)
+        for side, points in hands.items():
             lay_hand(iuv, box, side, points, body.landmarks)
         return PersonEstimate(
             track=number,

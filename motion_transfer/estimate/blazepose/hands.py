@@ -7,6 +7,7 @@ numbers are those of MediaPipe's graphs `hand_landmarks_from_pose_to_recrop_roi`
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from math import atan2, hypot, pi
 
@@ -15,7 +16,7 @@ from jaxtyping import Float32, UInt8
 
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.inference import CpuNetwork
-from motion_transfer.estimate.interface import AT_ONCE, LANDMARK, Landmarks
+from motion_transfer.estimate.interface import AT_ONCE, LANDMARK, SIDES, Landmarks
 from motion_transfer.estimate.models import HAND_CROPPER, HAND_LANDMARKER, find_model
 
 POINT_COUNT = 21
@@ -63,7 +64,7 @@ class HandModel:
         if (landmarks.visibility[rows] < SURE).any():
             return None
         region = first_region(*landmarks.image[rows, :2])
-        if region.side < FIRST_CROP * LEAST_SIZE or not _is_in(region, frame):
+        if region.side < FIRST_CROP * LEAST_SIZE or not region.has_middle_in(frame):
             return None
         region = self._crop(frame, region)
         if not region.is_usable:
@@ -93,14 +94,12 @@ def open_hand_model() -> HandModel:
 
 
 def find_hands(
-    frame: UInt8[np.ndarray, "H W 3"], landmarks: Landmarks
+    frame: UInt8[np.ndarray, "H W 3"], landmarks: Landmarks, sides: Sequence[str] = SIDES
 ) -> dict[str, Float32[np.ndarray, "21 3"]]:
-    """Find the hands of somebody whose landmarks are known, the farther one first."""
+    """Find the hands of somebody whose landmarks are known."""
     model = open_hand_model()
-    found = {side: model.find(frame, landmarks, side) for side in ("left", "right")}
-    hands = {side: points for side, points in found.items() if points is not None}
-    far = {side: landmarks.image[LANDMARK[f"{side}-wrist"], 2] for side in hands}
-    return dict(sorted(hands.items(), key=lambda hand: -far[hand[0]]))
+    found = {side: model.find(frame, landmarks, side) for side in sides}
+    return {side: points for side, points in found.items() if points is not None}
 
 
 def first_region(wrist: np.ndarray, index: np.ndarray, pinky: np.ndarray) -> Region:
@@ -118,8 +117,3 @@ def _region(middle: np.ndarray, up: np.ndarray, scale: float) -> Region:
     region = Region(float(middle[0]), float(middle[1]), side, turn)
     ahead = region.to_frame(np.array([[0.5, 0.5 - TOWARDS_TIPS]], np.float32))[0]
     return Region(float(ahead[0]), float(ahead[1]), side, turn)
-
-
-def _is_in(region: Region, frame: np.ndarray) -> bool:
-    height, width = frame.shape[:2]
-    return 0 <= region.x < width and 0 <= region.y < height

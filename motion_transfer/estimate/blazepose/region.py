@@ -60,6 +60,11 @@ class Region:
         """Whether it is a square of a size that can be looked at."""
         return bool(np.isfinite([self.x, self.y, self.side, self.turn]).all() and self.side >= 2)
 
+    def has_middle_in(self, frame: np.ndarray) -> bool:
+        """Tell whether its middle lies on a frame."""
+        height, width = frame.shape[:2]
+        return 0 <= self.x < width and 0 <= self.y < height
+
     def change_to(self, other: Region) -> float:
         """Measure how much another region differs: the most of what it is away and larger or
         smaller, in shares of this one's side, and turned, in radians."""

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float32, UInt8
 from motion_transfer.drawing.person import Box
 from motion_transfer.estimate.interface import LANDMARK, Landmarks
 from motion_transfer.estimate.surfaces.hand_surface import HandSurface, load_hand
+from motion_transfer.estimate.surfaces.head_surface import HeadSurface
 from motion_transfer.estimate.surfaces.raster import draw_charts
 
 PART = {"right": 3, "left": 4}
@@ -36,20 +37,16 @@ def lay_hand(
     surface = load_hand(side)
     elbow, wrist = (landmarks.image[LANDMARK[f"{side}-{name}"]] for name in ("elbow", "wrist"))
     points = surface.pose(seen, wrist - elbow)
-    own = _box_of(points)
-    margin = round(AROUND * max(own.width, own.height))
-    place = _within(
-        Box(own.left - margin, own.top - margin, own.right + margin, own.bottom + margin), box
-    )
+    place = within(box_of(points, AROUND), box)
     if place is None:
         return
-    drawn = _draw(surface, points, place)
+    drawn = draw(surface, points, place)
     here = iuv[
         place.top - box.top : place.bottom - box.top, place.left - box.left : place.right - box.left
     ]
     part = PART[side]
     is_hand, was_hand = drawn[..., 0] == part, here[..., 0] == part
-    _clear(here, was_hand)
+    clear(here, was_hand)
     # the forearm's end only where it closes a gap: the network knows the rest of it
     shown = is_hand | ((drawn[..., 0] > 0) & was_hand)
     np.copyto(here, drawn, where=shown[..., None])
@@ -67,23 +64,27 @@ def hand_room(points: Float32[np.ndarray, "21 3"], box: Box, height: int, width:
     )
 
 
-def _clear(iuv: UInt8[np.ndarray, "h w 3"], where: Bool[np.ndarray, "h w"]) -> None:
+def clear(iuv: UInt8[np.ndarray, "h w 3"], where: Bool[np.ndarray, "h w"]) -> None:
     """Give pixels what the nearest of the others show; nothing if there are none."""
     if where.all():
         iuv[:] = 0
         return
-    _, nearest = cv2.distanceTransformWithLabels(
-        where.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    x, y, width, height = cv2.boundingRect(where.view(np.uint8))
+    near = np.s_[max(0, y - 1) : y + height + 1, max(0, x - 1) : x + width + 1]
+    iuv, where = iuv[near], where[near]
+    _, labels = cv2.distanceTransformWithLabels(
+        where.view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    nearest = np.asarray(nearest, np.int32)
+    nearest = np.asarray(labels, np.int32)
     value = np.zeros((int(nearest.max()) + 1, 3), np.uint8)
     value[nearest[~where]] = iuv[~where]
     iuv[where] = value[nearest[where]]
 
 
-def _draw(
-    surface: HandSurface, points: Float32[np.ndarray, "V 3"], place: Box
+def draw(
+    surface: HandSurface | HeadSurface, points: Float32[np.ndarray, "V 3"], place: Box
 ) -> UInt8[np.ndarray, "h w 3"]:
+    """Draw a posed surface on a place of the frame; 0 where it is not."""
     shrunk = max(place.width, place.height) / FINEST
     if shrunk <= 1:
         return draw_charts(points, surface.faces, surface.part, surface.uv, place)
@@ -94,12 +95,16 @@ def _draw(
     return cv2.resize(drawn, (place.width, place.height), interpolation=cv2.INTER_NEAREST)
 
 
-def _box_of(points: Float32[np.ndarray, "V 3"]) -> Box:
+def box_of(points: Float32[np.ndarray, "V 3"], around: float) -> Box:
+    """Lay a box around posed points, wider on each side by a share of the longer one."""
     low, high = np.floor(points[:, :2].min(0)), np.ceil(points[:, :2].max(0))
-    return Box(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+    margin = round(around * float((high - low).max()))
+    (left, top), (right, bottom) = low - margin, high + margin
+    return Box(int(left), int(top), int(right), int(bottom))
 
 
-def _within(one: Box, other: Box) -> Box | None:
+def within(one: Box, other: Box) -> Box | None:
+    """Find what two boxes share; None if that is nothing."""
     left, top = max(one.left, other.left), max(one.top, other.top)
     right, bottom = min(one.right, other.right), min(one.bottom, other.bottom)
     return Box(left, top, right, bottom) if left < right and top < bottom else None

@@ -25,34 +25,48 @@ def draw_charts(
         part, uv: Of each triangle, and of its corners.
     """
     drawn = np.zeros((box.height, box.width, 3), np.uint8)
-    corners = points[faces]
-    corners[..., :2] -= np.array([box.left + 0.5, box.top + 0.5], np.float32)  # pixels: whole
-    flat = corners[..., :2]
-    low = np.ceil(flat.min(1)).clip(0).astype(np.int64)
-    high = np.floor(flat.max(1)).clip(max=(box.width - 1, box.height - 1)).astype(np.int64)
-    size = high - low + 1
+    flat = points[:, :2] - np.array([box.left + 0.5, box.top + 0.5], np.float32)  # pixels: whole
+    x, y = (np.ascontiguousarray(flat[:, axis])[faces.T] for axis in (0, 1))
     # the share of a corner grows from the side across, which is its own line of the picture
-    along = np.roll(flat, -2, axis=1) - np.roll(flat, -1, axis=1)
-    area = along[:, 1, 0] * along[:, 2, 1] - along[:, 1, 1] * along[:, 2, 0]
-    shown = np.flatnonzero((area > LEAST_AREA) & (size > 0).all(1))
-    # every pixel of every triangle's own box, one row each
-    counts = size[shown].prod(1)
-    which = np.repeat(shown, counts)
-    number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    row, column = np.divmod(number, size[which, 0])
-    x, y = column + low[which, 0], row + low[which, 1]
-    normal = along[..., ::-1] * np.array([-1, 1], np.float32) / area.clip(LEAST_AREA)[:, None, None]
-    offset = (normal * np.roll(flat, -1, axis=1)).sum(-1)
-    shares = normal[which, :, 0] * x[:, None] + normal[which, :, 1] * y[:, None] - offset[which]
-    inside = (shares >= 0).all(1)
-    which, x, y, shares = which[inside], x[inside], y[inside], shares[inside].astype(np.float32)
-    depth = np.einsum("nc,nc->n", shares, corners[which, :, 2])
+    dx, dy = (np.stack([c[2] - c[1], c[0] - c[2], c[1] - c[0]]) for c in (x, y))
+    area = dx[1] * dy[2] - dy[1] * dx[2]
+    left, top = (np.ceil(c.min(0)).clip(0).astype(np.int64) for c in (x, y))
+    width, height = (
+        (np.floor(c.max(0)).clip(max=most - 1).astype(np.int64) - first + 1).clip(0)
+        for c, first, most in ((x, left, box.width), (y, top, box.height))
+    )
+    shown = np.flatnonzero((area > LEAST_AREA) & (width > 0) & (height > 0))
+    # rows of triangles' own boxes, then their pixels: one number each
+    line, row = _count_up(height[shown])
+    which, column = _count_up(width[shown[line]])
+    triangle = shown[line[which]]
+    px, py = (left[triangle] + column).astype(np.int32), (top[shown[line]] + row)[which]
+    shares: list[np.ndarray] = []
+    for corner in range(3):
+        across, other = -dy[corner] / area.clip(LEAST_AREA), (corner + 1) % 3
+        down = dx[corner] / area.clip(LEAST_AREA)
+        start = -across * x[other] - down * y[other]
+        share = across[triangle] * px + down[triangle] * py + start[triangle]
+        inside = share >= 0
+        triangle, px, py = triangle[inside], px[inside], py[inside]
+        shares = [each[inside] for each in (*shares, share)]
+    depths = points[:, 2][faces.T]
+    depth = sum(share * depths[corner, triangle] for corner, share in enumerate(shares))
     order = np.argsort(-depth, kind="stable")  # of those at one pixel the last one stays
     nearest = np.full((box.height, box.width), -1, np.int64)
-    nearest[y[order], x[order]] = order
+    nearest[py[order], px[order]] = order
     covered: Bool[np.ndarray, "h w"] = nearest >= 0
     chosen = nearest[covered]
-    drawn[covered, 0] = part[which[chosen]]
-    places = np.einsum("nc,ncu->nu", shares[chosen], uv[which[chosen]].astype(np.float32))
-    drawn[covered, 1:] = np.rint(places)
+    drawn[covered, 0] = part[triangle[chosen]]
+    places = uv[triangle[chosen]].astype(np.float32)
+    mixed = sum(share[chosen, None] * places[:, corner] for corner, share in enumerate(shares))
+    drawn[covered, 1:] = np.rint(mixed)
     return drawn
+
+
+def _count_up(
+    counts: Int64[np.ndarray, " N"],
+) -> tuple[Int64[np.ndarray, " M"], Int64[np.ndarray, " M"]]:
+    """List so many of each of N things: which it is, and the how many-th of it."""
+    which = np.repeat(np.arange(len(counts)), counts)
+    return which, np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
