@@ -18,7 +18,6 @@ from motion_transfer.drawing.canvas import Canvas, Figure, Picture, Spot, show_a
 from motion_transfer.drawing.light import match_light
 from motion_transfer.drawing.renderers.interface import Renderer
 from motion_transfer.drawing.source import Source
-from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError
 from motion_transfer.option import parse_background
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
@@ -33,7 +32,7 @@ from motion_transfer.render.backdrop import (
     open_background,
 )
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
-from motion_transfer.render.placing import place_people
+from motion_transfer.render.placing import place_in_square, place_people
 from motion_transfer.render.scene import make_canvas, make_still, person_light
 
 KEPT = 4  # results of each step: some options back and forth without waiting
@@ -111,14 +110,14 @@ class Scenes:
         driver_size: tuple[int, int],
         canvas: Canvas,
     ) -> list[tuple[Spot, ...]]:
-        if options.size == "crop":
-            whole = Spot(Window(0, 0, canvas.height), canvas.height)
-            return [(whole,) * len(everyone[0].planned)]
         plans = [known.plan for known in everyone]
         wish = (options.place, options.on_the_spot, options.size, options.background)
         words = (*wish, *map(id, plans))  # they are kept with their places, and none can be another
         if self._spots[0][:-1] != words:
-            places = place_people(plans, options, driver_size, (canvas.height, canvas.width))
+            if options.size == "crop":
+                places = [place_in_square(plans[0], canvas.height)]
+            else:
+                places = place_people(plans, options, driver_size, (canvas.height, canvas.width))
             self._spots = (*words, plans), places
         return self._spots[1]
 

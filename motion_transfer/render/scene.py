@@ -13,7 +13,6 @@ from motion_transfer.drawing.canvas import Canvas, Comparison, Spot
 from motion_transfer.drawing.light import Light, match_light, measure_light
 from motion_transfer.drawing.person import occupancy
 from motion_transfer.drawing.source import Source
-from motion_transfer.drawing.window import Window
 from motion_transfer.events import Listener
 from motion_transfer.render.backdrop import (
     Backdrop,
@@ -26,7 +25,7 @@ from motion_transfer.render.backdrop import (
 )
 from motion_transfer.render.driver import DriverFile, DriverScan
 from motion_transfer.render.options import RenderOptions
-from motion_transfer.render.placing import place_people
+from motion_transfer.render.placing import place_in_square, place_people
 from motion_transfer.render.plan import DriverPlan
 
 
@@ -131,7 +130,7 @@ def make_actors(
     size = canvas.height, canvas.width
     if options.size == "crop":
         # of the largest shot's window; others are enlarged to it
-        spots = [(Spot(Window(0, 0, canvas.height), canvas.height),) * len(plans[0].frames)]
+        spots = [place_in_square(plans[0], canvas.height)]
     else:
         spots = place_people(plans, options, (scans[0].height, scans[0].width), size)
     tables: list[np.ndarray | None] = [None] * len(plans)

@@ -11,7 +11,7 @@ import pytest
 
 from motion_transfer.drawing.person import Box, Person
 from motion_transfer.drawing.window import Window
-from motion_transfer.render.placing import place_people
+from motion_transfer.render.placing import place_in_square, place_people
 from motion_transfer.render.plan import DriverPlan, FramePlan, Shot
 
 DRIVER = (200, 300)
@@ -86,6 +86,12 @@ def test_a_jump_leaves_the_ground_where_it_is() -> None:
     (spots,) = place_people([plan(jump)], Wish(on_the_spot=True), DRIVER, DRIVER)
     assert {spot.ground for spot in spots} == {140}
     assert len({spot.window for spot in spots}) == 1
+
+
+def test_in_the_square_the_ground_is_under_the_feet() -> None:
+    spots = place_in_square(plan(standing(bottom=140)), 256)
+    assert {spot.window for spot in spots} == {Window(0, 0, 256)}
+    assert {spot.ground for spot in spots} == {(140 - 20) * 2}
 
 
 def test_each_shot_begins_at_the_place() -> None:
