@@ -39,9 +39,9 @@ from motion_transfer.preview.views import (
     write_proxies,
 )
 from motion_transfer.render.backdrop import no_pictures, open_background
+from motion_transfer.render.composition import cast_files
 from motion_transfer.render.driver import open_driver
 from motion_transfer.render.inputs import (
-    appearance_files,
     find_source_iuv,
     is_clip,
     iuv_names,
@@ -266,7 +266,11 @@ class Session:
         source = None
         if "person" in words:
             source = self._queue.ask(lambda: self.views.source(draft_of(changed))).result()
+        inputs = Inputs(cast_files(changed)) if "background" in words else None
         with self._lock:  # the driver may have been looked through meanwhile
+            if inputs is not None:
+                self._inputs = inputs
+                self._errors.pop("inputs", None)
             if self.driver is not None:
                 self.plans = plan_frames(self.driver, changed)
             self.options = changed
@@ -347,7 +351,7 @@ class Session:
         if paths[0] != self.options.source[0]:
             changes["person"] = "largest"  # another photo's people are others
         changed = replace(self.options, **changes)
-        inputs = Inputs(appearance_files(changed))
+        inputs = Inputs(cast_files(changed))
 
         def read() -> tuple[Source, int]:
             source = self.views.source(draft_of(changed))
@@ -512,7 +516,7 @@ class Session:
 
     def _find_source(self) -> None:
         try:
-            self._inputs = Inputs(appearance_files(self.options))
+            self._inputs = Inputs(cast_files(self.options))
             self.source = self.views.source(draft_of(self.options))
             self.source_people = count_people(self.source, self.options)
         except Exception as error:  # the page has to say so, whatever it was

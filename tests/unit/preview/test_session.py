@@ -23,7 +23,7 @@ from motion_transfer.preview.queue import StaleError
 from motion_transfer.preview.session import Session
 from motion_transfer.preview.views import Views, project_features
 from motion_transfer.render.driver import open_driver
-from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.options import Partner, RenderOptions
 from motion_transfer.render.run import run
 
 COUNT = 40
@@ -86,6 +86,40 @@ def test_a_frame_is_the_one_that_the_run_draws(options: RenderOptions, changes: 
     for index in (plans.chosen.start, 12, plans.chosen.stop - 1):
         drawn = read_photo(options.output / f"{index - plans.chosen.start:06d}.png").rgb
         assert np.array_equal(views.result(options, driver, plans, index), drawn)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"background": "sea.mkv", "shadow": True, "place": "0.3,0.8,0.7"},
+        {"background": "sea.mkv", "size": "background", "on_the_spot": True},
+        {"background": "sea.mkv", "background_blur": 3.0, "match_colours": True},
+        {"background": "transparent", "shadow": True, "size": "crop"},
+        {"driver": "two.npy", "driver_person": "0", "partners": "1", "shadow": True},
+    ],
+)
+def test_a_scene_is_the_one_that_the_run_draws(
+    options: RenderOptions, studio, changes: dict
+) -> None:
+    sea = np.random.default_rng(0).integers(0, 255, (7, 80, 120, 3), np.uint8)
+    studio.video(sea, name="sea.mkv")
+    frames = [np.hstack([studio.iuv(i % 3), studio.iuv(-i % 4, 2)]) for i in range(20)]
+    studio.array(np.stack(frames), name="two.npy")
+    if changes.get("background") == "sea.mkv":
+        changes = {**changes, "background": str(studio.folder / "sea.mkv")}
+    if "partners" in changes:
+        bob = Partner(photo=studio.source("bob"), person=changes["partners"])
+        changes = {**changes, "driver": studio.folder / "two.npy", "partners": (bob,)}
+    options = replace(options, **changes)
+    run(options)
+    driver, views = see_all(options), Views()
+    plans = plan_frames(driver, options)
+    for index in (0, 11, 19):
+        drawn = read_photo(options.output / f"{index:06d}.png")
+        shown = views.result(options, driver, plans, index)
+        assert np.array_equal(shown[..., :3], drawn.rgb)
+        if options.transparent:
+            assert np.array_equal(shown[..., 3], drawn.alpha)
 
 
 def test_a_frame_of_the_network_is_the_one_that_the_run_draws(
@@ -445,3 +479,18 @@ def wait_for(condition: Callable[[], bool]) -> None:
             return
         time.sleep(0.05)
     raise AssertionError("it did not happen within half a minute")
+
+
+def test_a_background_that_changes_meanwhile_is_told(
+    options: RenderOptions, studio, open_session
+) -> None:
+    behind = studio.image("wall.png", np.full((8, 8, 3), 90, np.uint8))
+    session = open_session(options)
+    session.wait_for_plan()
+    session.change({"background": str(behind)})
+    assert picture(session.ask_frame(0, "result", session.key).result())[0, 0, 0] == 90
+    studio.image("wall.png", np.full((9, 9, 3), 10, np.uint8))
+    with pytest.raises(InputError, match=r"wall\.png has changed"):
+        session.ask_frame(1, "result", session.key)
+    session.change({"background": str(behind)})
+    assert session.error is None
