@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
+from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.stream import Frame, PictureStream
 
 OPEN_DECODERS = 4  # kept for the next stretch
@@ -41,14 +42,23 @@ class Player:
                     if decoder is None or not 0 <= number - decoder.position <= FARTHEST_SKIP:
                         self._put_back(decoder)
                         decoder = self._take(number)
-                    while decoder.position < number:
-                        next(decoder.pictures)
-                        decoder.position += 1
-                    picture = next(decoder.pictures)()
-                    decoder.position, shown = number + 1, number
+                    picture, shown = self._go_to(decoder, number)(), number
                 yield picture
+        except InputError:
+            decoder = None  # it stands nowhere
+            raise
         finally:
             self._put_back(decoder)
+
+    def _go_to(self, decoder: _Decoder, number: int) -> Callable[[], Frame]:
+        make: Callable[[], Frame] | None = None
+        while decoder.position <= number:
+            make = next(decoder.pictures, None)
+            if make is None:
+                raise InputError(f"{self._clip.where(number)} is not there; export it again")
+            decoder.position += 1
+        assert make is not None  # `_take` gives a decoder that has not passed it
+        return make
 
     def _take(self, number: int) -> _Decoder:
         """Take the decoder that is nearest before a picture, or open one there."""

@@ -9,7 +9,9 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from estimate_stubs import FramesInMemory
 
+from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.formats import open_pictures
 from motion_transfer.media.pictures.playing import Player
 
@@ -79,6 +81,15 @@ def test_a_decoder_goes_on_where_it_stands(clip: Path) -> None:
     assert opened == [0]
     numbers(player.read([3]))
     assert opened == [0, 3]
+
+
+def test_a_clip_that_is_shorter_than_it_says_is_told_of() -> None:
+    clip = FramesInMemory([np.full((4, 4, 3), level, np.uint8) for level in (0, 3, 6)])
+    clip.frame_count = 5
+    player = Player(clip)
+    with pytest.raises(InputError, match="frame 3 is not there; export it again"):
+        list(player.read([1, 3]))
+    assert numbers(player.read([2])) == [2]
 
 
 def test_a_repeated_frame_is_the_same_object(clip: Path) -> None:
