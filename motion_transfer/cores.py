@@ -1,9 +1,15 @@
-"""How many cores this process may keep busy: all that it sees, or its share of them."""
+"""The cores: how many this process may keep busy, and what they can multiply."""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
+from functools import cache
+from pathlib import Path
+
+CPU_FACTS = Path("/proc/cpuinfo")
+SUMS_OF_BYTES = re.compile(r"\b(?:avx512_vnni|avx_vnni|amx_int8|asimddp)\b")
 
 _share: int | None = None
 
@@ -11,6 +17,17 @@ _share: int | None = None
 def core_count() -> int:
     """Tell how many threads are worth having here."""
     return _share or len(os.sched_getaffinity(0))
+
+
+@cache
+def sums_bytes() -> bool:
+    """Tell whether the CPU adds products of bytes in 32 bits, exactly.
+
+    Without such an instruction, x86 adds two of them in 16 bits (AVX2's `vpmaddubsw`), which
+    overflow: 8 bits are then wrong where numbers are large, and not faster. Measured on an AMD EPYC
+    with AVX2 alone: `lite` differs from 32 bits by 43 dB, not 54, and takes as long.
+    """
+    return CPU_FACTS.exists() and bool(SUMS_OF_BYTES.search(CPU_FACTS.read_text()))
 
 
 def take_share(count: int) -> None:

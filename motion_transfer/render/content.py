@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motion_transfer.cores import CPU_FACTS
 from motion_transfer.estimate.opening import estimator_facts
 from motion_transfer.media.work import digest_file, key_of
 from motion_transfer.option import list_options
@@ -30,7 +31,6 @@ LIBRARIES = (
     *("torch", "openvino", "onnxruntime"),
     *("numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy"),
 )
-CPU_FACTS = Path("/proc/cpuinfo")
 VECTOR_UNITS = re.compile(r"\b(?:avx|amx|asimd|sve)\w*")
 KEYED_ELSEWHERE = {
     *("source", "source_iuv", "garments", "weights", "adapt"),  # by the files' content

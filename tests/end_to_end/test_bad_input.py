@@ -166,7 +166,7 @@ CASES: dict[str, tuple[Callable | list[str], str]] = {
         ["--renderer", "nhrr", "--weights", "none.safetensors"],
         "weights none.* does not exist",
     ),
-    "codec unknown": (["--codec", "prores"], "unknown codec 'prores'"),
+    "codec unknown": (["--codec", "cinepak"], "unknown codec 'cinepak'"),
     "codec in another container": (["--codec", "ffv1"], r"\.mp4 cannot hold ffv1"),
     "crf too high": (["--crf", "99"], "--crf 99: h264 takes a crf of 0 to 51"),
     "ending unknown": (lambda s: ["-o", s.folder / "out.avi"], r"unknown ending \.avi"),
