@@ -18,6 +18,7 @@ from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.workers import Fetch
 
 if TYPE_CHECKING:  # the scheduler imports this module, and has no need of the libraries below
+    from motion_transfer.events import Listener
     from motion_transfer.render.composition import Prepared
 
 
@@ -58,6 +59,19 @@ class Outline:
     files: Files
 
 
+def _hear() -> tuple[dict[str, None], Listener]:
+    """Make a listener, and what it collects: notices, each once, in their order."""
+    from motion_transfer.events import Event, Notice
+
+    notices: dict[str, None] = {}
+
+    def listen(event: Event) -> None:
+        if isinstance(event, Notice):
+            notices[event.message] = None
+
+    return notices, listen
+
+
 def scan(options: RenderOptions, folder: Path) -> tuple[bytes, list[str]]:
     """Look through a driver, for each of the cast.
 
@@ -66,17 +80,11 @@ def scan(options: RenderOptions, folder: Path) -> tuple[bytes, list[str]]:
     Returns: The scans, and what is worth saying.
     Raises: InputError, IuvFileError.
     """
-    from motion_transfer.events import Event, Notice
     from motion_transfer.render.composition import scan_cast
 
-    notices: list[str] = []
-
-    def listen(event: Event) -> None:
-        if isinstance(event, Notice):
-            notices.append(event.message)
-
+    notices, listen = _hear()
     scanned = scan_cast(options, folder, listen, workers=1)
-    return pickle.dumps(scanned, PICKLE_PROTOCOL), list(dict.fromkeys(notices))
+    return pickle.dumps(scanned, PICKLE_PROTOCOL), list(notices)
 
 
 def encode(options: RenderOptions) -> tuple[bytes, bytes, tuple[str, ...]]:
@@ -113,7 +121,6 @@ def prepare(
     Raises: InputError and its kinds, also if a source is no longer what its appearance was made
         from.
     """
-    from motion_transfer.events import Event, Notice
     from motion_transfer.render.composition import (
         check_early,
         open_recipe,
@@ -125,12 +132,7 @@ def prepare(
     from motion_transfer.render.plan import describe_missing
     from motion_transfer.render.run import output_key, piece_of
 
-    notices: list[str] = []
-
-    def listen(event: Event) -> None:
-        if isinstance(event, Notice):
-            notices.append(event.message)
-
+    notices, listen = _hear()
     check_early(options)
     scans = pickle.loads(scanned())
     plans = plan_cast(options, scans)
@@ -152,7 +154,7 @@ def prepare(
         # a thread that draws for itself would gain nothing from a second chunk
         CHUNKS_AT_ONCE if recipe.occupies != "nothing" else 1,
         output_key(run),
-        "; ".join(filter(None, [*dict.fromkeys(notices), missing])),
+        "; ".join(filter(None, [*notices, missing])),
         run.inputs.keys(),
     )
     return pickle.dumps(run, PICKLE_PROTOCOL), outline

@@ -45,7 +45,7 @@ def run(
     mt run --source front.jpg --source back.jpg --driver dance.mp4 -o out.mp4
     mt run --source photo.png --driver dance.mp4 --background photo --compare -o out.mp4
     mt run --source photo.png --driver dance.mp4 --background transparent -o out.webm
-    mt run --source photo.png --driver dance.mp4 --background street.mp4 --size background \
+    mt run --source photo.png --driver dance.mp4 --background street.mp4 --size background \\
            --place 0.5,0.9,1.5 --shadow -o out.mp4
     mt run --source me.png --driver me_IUV.png --garment dress.png \\
            --garment-parts torso,upper-legs --background photo -o dressed.png

@@ -23,17 +23,15 @@ from motion_transfer.option import parse_background
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.render.backdrop import (
     Backdrop,
-    Clip,
     DriverPictures,
     OpenBackdrop,
-    Still,
     light_of,
     no_pictures,
     open_background,
 )
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
 from motion_transfer.render.placing import place_in_square, place_people
-from motion_transfer.render.scene import make_canvas, make_still, person_light
+from motion_transfer.render.scene import make_backdrop, make_canvas, person_light
 
 KEPT = 4  # results of each step: some options back and forth without waiting
 THUMB_SIZE = (90, 120)  # height and width, px: of a tile of the page, for dense screens
@@ -132,18 +130,15 @@ class Scenes:
         source = self._source_of(options)
         canvas = make_canvas(options, height, width, working_size, source)
         size = canvas.height, canvas.width
-        fit, blur = options.background_fit, options.background_blur
-        still = make_still(options, size, source)
-        backdrop: Backdrop = Still(still)
         if options.background == "driver":
             if driver.opened.pictures is None:
                 raise InputError(no_pictures(options.driver))
-            people = (driver.opened.file,)
-            backdrop = DriverPictures(options.driver, people, 0, ((0, None),), size, fit, blur)
-        elif options.background_file is not None and still is None:
+            people, plates = (driver.opened.file,), ((0, None),)
+            fit, blur = options.background_fit, options.background_blur
+            backdrop = DriverPictures(options.driver, people, 0, plates, size, fit, blur)
+        else:
             rate = options.frame_rate or DEFAULT_RATE
-            end = options.background_end
-            backdrop = Clip(options.background_file, size, rate, fit, end, blur)
+            backdrop = make_backdrop(options, size, rate, source)
         return _Scene(canvas, backdrop, backdrop.open(), driver.frame_count)
 
     def _make_table(self, member: RenderOptions, scene: _Scene) -> np.ndarray:

@@ -10,6 +10,7 @@ import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from itertools import islice, repeat
 from pathlib import Path
 from typing import Protocol
@@ -34,12 +35,14 @@ from motion_transfer.media.pictures.photo import read_photo, write_png
 from motion_transfer.media.pictures.playing import Player
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.media.publish import publish
+from motion_transfer.media.unchanged import status_key
 from motion_transfer.media.work import key_of
 from motion_transfer.option import SCENES
 from motion_transfer.render.driver import DriverFile, DriverScan
 from motion_transfer.render.options.scene import SceneOptions
 from motion_transfer.render.plan import DriverPlan
 
+KEPT_CLIPS = 4  # that are open
 LIGHT_FRAMES = 8  # of a video, evenly spread: its light is theirs
 PLATE_FRAMES = 200  # of a shot, evenly spread: who moves has been elsewhere in most of them
 MOVING_CAMERA = 14.0
@@ -103,7 +106,7 @@ class Clip:
 class _PlayedClip:
     def __init__(self, clip: Clip) -> None:
         self._clip = clip
-        pictures = open_pictures(clip.path)
+        pictures = open_background(clip.path)
         self._count, self._rate = pictures.frame_count, pictures.frame_rate or clip.rate
         self._player = Player(pictures)
 
@@ -157,13 +160,18 @@ class _OpenDriver:
     def read(self, start: int, stop: int) -> Iterator[Frame]:
         backdrop = self._backdrop
         frames = range(backdrop.first + start, backdrop.first + stop)
+        plates = self._plates(start, stop)
+        for (picture, area), plate in zip(self.look(frames), plates, strict=True):
+            emptied = _take_out(picture, area, plate)
+            yield blur_picture(fit_picture(emptied, backdrop.size, backdrop.fit), backdrop.blur)
+
+    def look(self, frames: range) -> Iterator[tuple[Frame, UInt8[np.ndarray, "H W"]]]:
+        """Give the driver's pictures, each with the area of the people in it."""
         masks = zip(
             *(reader.read(frames.start, frames.stop) for reader in self._people), strict=True
         )
-        plates = self._plates(start, stop)
-        for picture, iuv, plate in zip(self._player.read(frames), masks, plates, strict=True):
-            emptied = _take_out(picture, _area(iuv), plate)
-            yield blur_picture(fit_picture(emptied, backdrop.size, backdrop.fit), backdrop.blur)
+        for picture, people in zip(self._player.read(frames), masks, strict=True):
+            yield picture, np.maximum.reduce([person_area(iuv) for iuv in people])
 
     def _plates(self, start: int, stop: int) -> Iterator[Frame | None]:
         """Give the plate of each frame; one is read for a stretch of them."""
@@ -196,6 +204,12 @@ def open_background(path: Path) -> PictureStream:
             f" #rrggbb, {', '.join(SCENES)}"
         )
     check_readable(path, "background", folder=True)
+    return _open_as_it_is(path, status_key(path))
+
+
+@lru_cache(KEPT_CLIPS)
+def _open_as_it_is(path: Path, _status: str) -> PictureStream:
+    """Open pictures once for all who ask: to count a video's frames is to go through all of it."""
     try:
         return open_pictures(path)
     except InputError as error:  # which begins with the path
@@ -239,13 +253,13 @@ def empty_driver(
         driver.path, people, plan.first, (), size, options.background_fit, options.background_blur
     )
     listener(Stage("background", len(plan.frames)))
-    plates = []
+    key = key_of({"people": [scan.pictures and scan.pictures.key for scan in scans]})
+    opened, plates = _OpenDriver(backdrop), []
     for shot in plan.shots:
         frames = range(plan.first + shot.start, plan.first + shot.stop)
-        key = key_of({"people": [scan.pictures and scan.pictures.key for scan in scans]})
         path: Path | None = folder / f"plate-{key[:16]}-{frames.start}-{frames.stop}.png"
         if not path.exists():  # or an earlier run has made it
-            path = _write_plate(path, _make_plate(backdrop, frames))
+            path = _write_plate(path, _make_plate(opened, frames))
         plates.append((shot.start, path))
         listener(FramesDone(len(frames)))
     if moving := sum(path is None for _, path in plates):
@@ -297,16 +311,12 @@ def _write_plate(path: Path, plate: Frame | None) -> Path | None:
     return path
 
 
-def _make_plate(backdrop: DriverPictures, frames: range) -> Frame | None:
+def _make_plate(driver: _OpenDriver, frames: range) -> Frame | None:
     """Average what the frames of a shot show where nobody is; None if the camera moves."""
     total = squares = count = None
     step = -(-len(frames) // PLATE_FRAMES)
-    pictures = Player(open_pictures(backdrop.path)).read(frames)
-    people = zip(
-        *(file.open().read(frames.start, frames.stop) for file in backdrop.people), strict=True
-    )
-    for picture, iuv in islice(zip(pictures, people, strict=True), 0, None, step):
-        free = (_area(iuv) == 0).astype(np.float32)[..., None]
+    for picture, area in islice(driver.look(frames), 0, None, step):
+        free = (area == 0).astype(np.float32)[..., None]
         if total is None:
             total = np.zeros(picture.shape, np.float32)
             squares, count = np.zeros(free.shape, np.float32), np.zeros(free.shape, np.float32)
@@ -324,11 +334,6 @@ def _make_plate(backdrop: DriverPictures, frames: range) -> Frame | None:
     if len(frames) > 1 and np.median(np.sqrt(np.maximum(variance[seen], 0))) > MOVING_CAMERA:
         return None
     return fill_from_around(mean.round().astype(np.uint8), (~seen).astype(np.uint8))
-
-
-def _area(people: Sequence[UInt8[np.ndarray, "H W 3"]]) -> UInt8[np.ndarray, "H W"]:
-    areas = [person_area(iuv) for iuv in people]
-    return np.maximum.reduce(areas)
 
 
 def _take_out(picture: Frame, area: UInt8[np.ndarray, "H W"], plate: Frame | None) -> Frame:

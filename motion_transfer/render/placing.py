@@ -57,14 +57,12 @@ def place_in_square(plan: DriverPlan, side: int) -> tuple[Spot, ...]:
     """Tell where a person is in each output frame that is the window itself, of a side in px."""
     whole = Window(0, 0, side)
     spots = []
-    for shot, grounds in zip(plan.shots, _split(plan, _follow_ground(plan)[:, 1]), strict=True):
-        rows = (grounds - shot.window.y) * (side / shot.window.side)
+    grounds = _follow_ground(plan)[:, 1]
+    for shot in plan.shots:
+        own = grounds[shot.start : shot.stop]
+        rows = (own - shot.window.y) * (side / shot.window.side)
         spots += [Spot(whole, ground) for ground in rows.round().astype(int).tolist()]
     return tuple(spots)
-
-
-def _split(plan: DriverPlan, values: np.ndarray) -> list[np.ndarray]:
-    return [values[shot.start : shot.stop] for shot in plan.shots]
 
 
 def _plan_move(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -96,12 +97,19 @@ def open_backdrop(
     size = canvas.height, canvas.width
     if options.background == "driver":
         return empty_driver(options, scans, plan, size, folder, listener)
+    return make_backdrop(options, size, plan.frame_rate, source)
+
+
+def make_backdrop(
+    options: RenderOptions, size: tuple[int, int], rate: Fraction, source: Source
+) -> Backdrop:
+    """Make a backdrop of (height, width) that is not the driver. Raises: InputError."""
     path = options.background_file
     picture = make_still(options, size, source)
     if path is None or picture is not None:
         return Still(picture)
     fit, end, blur = options.background_fit, options.background_end, options.background_blur
-    return Clip(path, size, plan.frame_rate, fit, end, blur)
+    return Clip(path, size, rate, fit, end, blur)
 
 
 def make_still(options: RenderOptions, size: tuple[int, int], source: Source) -> Frame | None:
@@ -111,7 +119,7 @@ def make_still(options: RenderOptions, size: tuple[int, int], source: Source) ->
     """
     if options.background_file is not None:
         return open_still(options, size)
-    if options.transparent or options.background == "driver":
+    if options.transparent:
         return None
     in_place = is_in_place(options, source)
     picture = make_background(options.background, size, source, in_place=in_place)
