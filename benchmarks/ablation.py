@@ -1,12 +1,12 @@
-"""The paper's ablation at an equal, small budget: `docs/quality.md` has what this prints.
+"""The paper's ablation, and other methods, at an equal, small budget: `docs/quality.md` tells it.
 
-    mt people render --count 1500 --views 4 --noise 0.5 --out people/
-    python benchmarks/ablation.py --people-cache people/ -o ablation/ [--steps 300] [--pairs 200]
-        [--variants warp warp-cond] [--set model.geometry=false]
+    mt people render --count 800 --views 4 --noise 0.5 --assets makehuman/ --out people/
+    python benchmarks/ablation.py --people-cache people/ --assets makehuman/ -o ablation/
+        [--steps 300] [--pairs 200] [--variants warp warp-cond] [--set model.geometry=false]
 
 Trains the variants one after the other, each with the same seed, people, steps and losses (but
 for those that a variant does not have), at 128 x 128, then scores them on held-out people at that
-size. Started again, it goes on where it was stopped.
+size: painted ones and, with assets, free ones. Started again, it goes on where it was stopped.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import torch.nn.functional as F
+
 from motion_transfer.cli.main import main as mt
+from motion_transfer.evaluation.options import FREE_PEOPLE
 from motion_transfer.weights.checkpoint import (
     inspect_checkpoint,
     load_checkpoint,
@@ -25,6 +28,7 @@ from motion_transfer.weights.checkpoint import (
 from nhrr_core import VARIANTS, NeuralReRenderer
 
 SIDE = 128
+PROTOCOLS = ("people", FREE_PEOPLE)
 SETTINGS = {
     "model.alpha": "true",
     "losses.identity": "none",
@@ -40,6 +44,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--people-cache", type=Path, required=True)
+    parser.add_argument("--assets", type=Path, help="folder of MakeHuman's")
     parser.add_argument("--steps", type=int, default=300)
     parser.add_argument("--pairs", type=int, default=200)
     parser.add_argument("--variants", nargs="+", choices=VARIANTS, default=VARIANTS)
@@ -47,18 +52,23 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.output.mkdir(exist_ok=True)
     changes = [f"{name}={value}" for name, value in SETTINGS.items()] + arguments.set
+    if arguments.assets:
+        changes.append(f"data.assets={arguments.assets}")
     weights = []
     for variant in arguments.variants:
         run = arguments.output / variant
         train(run, variant, arguments.people_cache, arguments.steps, changes)
         weights.append(arguments.output / f"{variant}.safetensors")
         halve(run / "weights.safetensors", weights[-1])
-    call(
-        *("eval", "--protocol", "people", "--limit", arguments.pairs, "--size", f"{SIDE}x{SIDE}"),
-        *(word for path in weights for word in ("--weights", path)),
-        *("--renderer", "texture"),
-        *("-o", arguments.output / "scores", "--force"),
-    )
+    for protocol in PROTOCOLS if arguments.assets else PROTOCOLS[:1]:
+        call(
+            *("eval", "--protocol", protocol, "--limit", arguments.pairs),
+            *("--size", f"{SIDE}x{SIDE}"),
+            *(("--assets", arguments.assets) if protocol == FREE_PEOPLE else ()),
+            *(word for path in weights for word in ("--weights", path)),
+            *("--renderer", "texture"),
+            *("-o", arguments.output / protocol, "--force"),
+        )
 
 
 def train(run: Path, variant: str, people: Path, steps: int, changes: Sequence[str]) -> None:
@@ -79,7 +89,10 @@ def halve(trained: Path, output: Path) -> None:
     """The same weights, for the size that they were trained at."""
     info = inspect_checkpoint(trained)
     model = NeuralReRenderer(replace(info.config, image_size=SIDE, texture_size=SIDE))
-    model.load_state_dict(load_checkpoint(trained).state_dict())
+    state = load_checkpoint(trained).state_dict()
+    if "prior" in state:
+        state["prior"] = F.adaptive_avg_pool2d(state["prior"], SIDE)  # as it was read
+    model.load_state_dict(state)
     save_checkpoint(output, model, notes=info.notes)
 
 

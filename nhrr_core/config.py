@@ -8,12 +8,20 @@ from typing import Any, Literal, get_args
 
 from nhrr_core.errors import ConfigError
 
-Variant = Literal["full", "no-int", "ip", "warp", "warp-cond"]
+Variant = Literal["full", "no-int", "ip", "warp", "warp-cond", "texture-features", "cbi", "dpt"]
 VARIANTS: tuple[str, ...] = get_args(Variant)
 
 COLOUR_CHANNELS = IUV_CHANNELS = 3
 POSITION_CHANNELS = 3  # x, y, z on the body in T-pose
 CLEARANCE_CHANNELS = 2  # the clearance, and whether any is known
+COORDINATE_CHANNELS = 2  # x, y in a photo
+PICTURE_CHANNELS = COLOUR_CHANNELS + IUV_CHANNELS
+
+PHOTO_FEATURES = 8
+"""Learned features of a photo's pixel, besides its colour."""
+
+BLENDING_BLOCKS = 3
+"""Residual blocks of the network that blends; from Neverova et al."""
 
 CLEARANCE_SIZE = 128
 """Side of the clearance's texture, texels. Few will do: it is known along outlines only."""
@@ -41,13 +49,30 @@ PLACE_METRES = 0.12
 
 
 @dataclass(frozen=True, kw_only=True)
+class RenderSizes:
+    """What decides the shape of one `RenderNet`; its arguments."""
+
+    inputs: int
+    outputs: int
+    width: int
+    down_blocks: int
+    residual_blocks: int
+    shortcut: bool
+    even: bool
+
+
+@dataclass(frozen=True, kw_only=True)
 class ModelConfig:
     """Everything that decides the shape of the networks, and nothing else.
 
     Attributes:
         variant: `full`; `no-int` (the same networks, trained without the texture loss); `ip` (the
             map is an inpainted RGB texture); `warp` (the partial texture itself); `warp-cond` (that
-            and the target IUV).
+            and the target IUV); `texture-features` (`full`, but texels carry learned features of
+            the photo besides colours); and two other methods: `cbi` (FeatureNet completes where in
+            the photo each texel is seen, and the map has the colours from there) and `dpt` (the map
+            is that of `ip`; RenderNet blends what is warped with what is drawn directly of photo
+            and both IUV).
         feature_channels: d, channels of the feature map for `full` and `no-int`.
         feature_width: Channels of FeatureNet's first block; they double down to 8 times that.
         render_width: Channels of RenderNet's first convolution; they double at each down block.
@@ -74,10 +99,12 @@ class ModelConfig:
         prior: FeatureNet reads a texture that is learned with it and is the same for everybody:
             what people look like where a photo does not show them, in the face above all.
         even: RenderNet's up-sampling can draw no checkerboard (`UpConvolution`).
-    Source: the paper, Sec. 3 and 4.4; widths from Pix2PixHD's global generator (RenderNet) and
-        U-Net (FeatureNet). Departs from it: the last nine. `visibility_input` is on; those after
-        it are off, and on in `lite`, so that networks learn in hours what to change instead of
-        learning in days to copy.
+    Source: the paper, Sec. 3 and 4.4; `texture-features` its Sec. 4.6, as future work; `cbi` from
+        Grigorev et al., "Coordinate-based texture inpainting" (CVPR 2019); `dpt` from Neverova et
+        al., "Dense pose transfer" (ECCV 2018); widths from Pix2PixHD's global generator (RenderNet)
+        and U-Net (FeatureNet). Departs from it: the last nine. `visibility_input` is on; those
+        after it are off, and on in `lite`, so that networks learn in hours what to change instead
+        of learning in days to copy.
     """
 
     variant: Variant = "full"
@@ -147,7 +174,32 @@ class ModelConfig:
     @property
     def has_feature_net(self) -> bool:
         """Whether a network completes the partial texture (all variants but the warps)."""
-        return self.variant in ("full", "no-int", "ip")
+        return not self.variant.startswith("warp")
+
+    @property
+    def reads_photo(self) -> bool:
+        """Whether a source is encoded from its photo as well, not from its texture alone."""
+        return self.variant in ("texture-features", "cbi", "dpt")
+
+    @property
+    def learns_features(self) -> bool:
+        """Whether the map holds more than colours: d channels, the first three of them colours."""
+        return self.variant in ("full", "no-int", "texture-features")
+
+    @property
+    def inpaints_first(self) -> bool:
+        """Whether FeatureNet is trained first, then fixed."""
+        return self.variant in ("ip", "cbi", "dpt")
+
+    @property
+    def supervises_texture(self) -> bool:
+        """Whether a loss holds the map's colours to what the photos show."""
+        return self.has_feature_net and self.variant != "no-int"
+
+    @property
+    def told_iuv(self) -> bool:
+        """Whether RenderNet reads the target IUV."""
+        return self.variant in ("warp-cond", "cbi", "dpt")
 
     @property
     def finest_texture(self) -> int:
@@ -159,32 +211,81 @@ class ModelConfig:
 
     @property
     def feature_inputs(self) -> int:
-        """Channels that FeatureNet reads: RGB, and what is known of each texel."""
+        """Channels that FeatureNet reads: what texels carry, and what is known of each."""
+        carried = {"cbi": COORDINATE_CHANNELS, "texture-features": COLOUR_CHANNELS + PHOTO_FEATURES}
         known = int(self.visibility_input) + int(self.prefilled)
-        return COLOUR_CHANNELS * (1 + self.prior) + known + POSITION_CHANNELS * self.geometry
+        learned = COLOUR_CHANNELS * self.prior + POSITION_CHANNELS * self.geometry
+        return carried.get(self.variant, COLOUR_CHANNELS) + known + learned
 
     @property
     def feature_outputs(self) -> int:
-        """Channels that FeatureNet writes: d, or 3 where the map is a colour texture."""
-        return self.feature_channels if self.variant in ("full", "no-int") else COLOUR_CHANNELS
+        """Channels that FeatureNet writes: d, or 3 of a colour texture, or 2 of coordinates."""
+        if self.learns_features:
+            return self.feature_channels
+        return COORDINATE_CHANNELS if self.variant == "cbi" else COLOUR_CHANNELS
+
+    @property
+    def appearance_channels(self) -> int:
+        """Channels of the map that say what somebody looks like: they come first."""
+        if self.learns_features:
+            return self.feature_channels
+        return COLOUR_CHANNELS + COORDINATE_CHANNELS * (self.variant == "cbi")
+
+    @property
+    def sampled_channels(self) -> int:
+        """Channels of the feature map that target IUV looks up: appearance, and what is carried."""
+        carried = CLEARANCE_CHANNELS * self.clearance + POSITION_CHANNELS * self.geometry
+        return self.appearance_channels + carried
 
     @property
     def map_channels(self) -> int:
-        """Channels of the feature map: FeatureNet's, and what is carried past it."""
-        carried = CLEARANCE_CHANNELS * self.clearance + POSITION_CHANNELS * self.geometry
-        return self.feature_outputs + carried
+        """Channels of the feature map; the last ones of `dpt` are the source's picture."""
+        return self.sampled_channels + PICTURE_CHANNELS * (self.variant == "dpt")
 
     @property
     def render_inputs(self) -> int:
         """Channels of the feature image, which RenderNet reads, see `feature_image`."""
-        iuv = IUV_CHANNELS if self.variant == "warp-cond" else 0
         around = int(self.clearance) + 1 if self.geometry else 0  # positions are in the map
-        return self.map_channels + iuv + around
+        return self.map_channels + IUV_CHANNELS * self.told_iuv + around
 
     @property
     def render_outputs(self) -> int:
         """Channels of a frame: RGB, and alpha where the configuration has it."""
         return COLOUR_CHANNELS + int(self.alpha)
+
+    @property
+    def render_sizes(self) -> RenderSizes:
+        """Those of RenderNet; `dpt` has the two below in its place."""
+        return RenderSizes(
+            inputs=self.render_inputs,
+            outputs=self.render_outputs,
+            width=self.render_width,
+            down_blocks=self.down_blocks,
+            residual_blocks=self.residual_blocks,
+            shortcut=self.geometry,
+            even=self.even,
+        )
+
+    @property
+    def direct_sizes(self) -> RenderSizes:
+        """Those of the network of `dpt` that draws without warping: it reads no colours of R."""
+        inputs = self.render_inputs - self.warped_channels
+        return replace(self.render_sizes, inputs=inputs, outputs=COLOUR_CHANNELS)
+
+    @property
+    def blending_sizes(self) -> RenderSizes:
+        """Those of the network of `dpt` that blends what is warped with what is drawn directly."""
+        return replace(
+            self.render_sizes,
+            inputs=self.render_inputs - PICTURE_CHANNELS + COLOUR_CHANNELS,
+            down_blocks=1,
+            residual_blocks=BLENDING_BLOCKS,
+        )
+
+    @property
+    def warped_channels(self) -> int:
+        """Channels of the feature image that were sampled, but for positions: they come first."""
+        return self.sampled_channels - POSITION_CHANNELS * self.geometry
 
 
 PRESETS = {

@@ -1,4 +1,7 @@
-"""FeatureNet f: a U-Net that completes a partial texture to a full UV feature map, F_s = f(T_s)."""
+"""FeatureNet f: a U-Net that completes a partial texture to a full UV feature map, F_s = f(T_s).
+
+And PhotoNet, which looks at a photo before it is unfolded.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from nhrr_core.tensors import FEATURE_DOWN_BLOCKS, feature_widths
+from nhrr_core.config import PHOTO_FEATURES, PICTURE_CHANNELS
+from nhrr_core.tensors import FEATURE_DOWN_BLOCKS, PHOTO_WIDTH, feature_widths
 
 
 def _two_convolutions(inputs: int, outputs: int) -> nn.Sequential:
@@ -57,3 +61,25 @@ class FeatureNet(nn.Module):
             x = F.interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=False)
             x = block(torch.cat([x, skips.pop()], dim=1))
         return self.exit(x)
+
+
+class PhotoNet(nn.Module):
+    """Learned features of each pixel of a photo, which see what lies around it: hair and clothes.
+
+    A U-Net of one halving, with FeatureNet's blocks: a feature depends on the 15 pixels about.
+
+    Source: the paper's discussion (Sec. 5), which proposes such features without giving a network.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.entry = _two_convolutions(PICTURE_CHANNELS, PHOTO_WIDTH)
+        self.down = _two_convolutions(PHOTO_WIDTH, 2 * PHOTO_WIDTH)
+        self.exit = nn.Conv2d(3 * PHOTO_WIDTH, PHOTO_FEATURES, 1)
+
+    def forward(self, picture: Float[Tensor, "B 6 S S"]) -> Float[Tensor, "B E S S"]:
+        """Look at RGB and IUV, each in [-1, 1]; S is even."""
+        near = self.entry(picture)
+        around = self.down(F.max_pool2d(near, 2))
+        around = F.interpolate(around, scale_factor=2.0, mode="bilinear", align_corners=False)
+        return self.exit(torch.cat([near, around], dim=1))

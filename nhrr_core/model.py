@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Shaped, UInt8
 from torch import Tensor, nn
 
 from nhrr_core.clearance import pixels_per_texel, spread_clearance
@@ -19,8 +19,9 @@ from nhrr_core.config import (
     UNIT_TEXELS,
     ModelConfig,
 )
+from nhrr_core.dense_pose_transfer import DirectAndBlending
 from nhrr_core.errors import ShapeError
-from nhrr_core.feature_net import FeatureNet
+from nhrr_core.feature_net import FeatureNet, PhotoNet
 from nhrr_core.iuv import normalise_iuv
 from nhrr_core.render_net import RenderNet
 from nhrr_core.sampling import sample_features, signed_distance, spread_colours
@@ -67,14 +68,9 @@ class NeuralReRenderer(nn.Module):
             if config.has_feature_net
             else None
         )
-        self.render_net = RenderNet(
-            inputs=config.render_inputs,
-            outputs=config.render_outputs,
-            width=config.render_width,
-            down_blocks=config.down_blocks,
-            residual_blocks=config.residual_blocks,
-            shortcut=config.geometry,
-            even=config.even,
+        self.photo_net = PhotoNet() if config.variant == "texture-features" else None
+        self.render_net = (
+            DirectAndBlending(config) if config.variant == "dpt" else RenderNet(config.render_sizes)
         )
         side = config.texture_size
         self.prior = (
@@ -98,15 +94,17 @@ class NeuralReRenderer(nn.Module):
         self, photo: Float[Tensor, "B 3 H W"], iuv: UInt8[Tensor, "B 3 H W"]
     ) -> Float[Tensor, "B D T T"]:
         """Compute the UV feature map F_s of a photo of any size. Raises: ShapeError, IuvError."""
-        return self.encode_texture(
-            *extract_texture(photo, iuv, self.charts, self.config.texture_size)
-        )
+        texture, visibility = extract_texture(photo, iuv, self.charts, self.config.texture_size)
+        levels = ((photo + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
+        pictures = torch.cat([levels, iuv], dim=1)[:, None] if self.config.reads_photo else None
+        return self.encode_texture(texture, visibility, pictures=pictures)
 
     def encode_texture(
         self,
         texture: Float[Tensor, "B 3 T T"],
         visibility: Float[Tensor, "B 1 T T"],
         clearance: Float[Tensor, "B 2 128 128"] | None = None,
+        pictures: UInt8[Tensor, "B P 6 S S"] | None = None,
     ) -> Float[Tensor, "B D T T"]:
         """Compute the UV feature map of a partial texture; for the warp variants it is the texture.
 
@@ -116,9 +114,13 @@ class NeuralReRenderer(nn.Module):
         Args:
             visibility: 1 where the texture shows something, else 0.
             clearance: What `unfold_clearance` made; None: nothing is known of it.
-        Raises: ShapeError if its side is not a multiple of 16.
+            pictures: What the texture was unfolded from, where `config.reads_photo`: features are
+                means of all pictures, other variants read the first.
+        Raises: ShapeError if its side is not a multiple of 16, or if pictures are lacking.
         """
-        carried = [self._complete(texture, visibility)]
+        if self.config.reads_photo and pictures is None:
+            raise ShapeError(f"variant {self.config.variant} reads the source's picture; give it")
+        carried = [self._complete(texture, visibility, pictures)]
         if self.config.clearance:
             if clearance is None:
                 clearance = texture.new_zeros(
@@ -128,38 +130,98 @@ class NeuralReRenderer(nn.Module):
             carried.append(spread_clearance(*filled, texture.shape[-1]))
         if self.config.geometry:
             carried.append(self._places_like(texture))
+        if self.config.variant == "dpt":
+            assert pictures is not None
+            picture = normalise_picture(pictures[:, 0]).to(texture.dtype)
+            carried.append(F.interpolate(picture, texture.shape[2:], mode="nearest-exact"))
         return torch.cat(carried, dim=1)
 
-    def _places_like(self, texture: Float[Tensor, "B 3 T T"]) -> Float[Tensor, "B 3 T T"]:
+    def _places_like(self, texture: Float[Tensor, "B C T T"]) -> Float[Tensor, "B 3 T T"]:
         """The position of each texel on the body, each axis in [-1, 1]."""
         places = F.interpolate(self.places, texture.shape[2:], mode="nearest-exact")
-        return places.to(texture.dtype).expand_as(texture)
+        return places.to(texture.dtype).expand(len(texture), -1, -1, -1)
 
     def _complete(
-        self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
+        self,
+        texture: Float[Tensor, "B 3 T T"],
+        visibility: Float[Tensor, "B 1 T T"],
+        pictures: UInt8[Tensor, "B P 6 S S"] | None,
     ) -> Float[Tensor, "B D T T"]:
         if self.feature_net is None:
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
             raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
-        fine = own = self._filled(texture, visibility)
-        if not self.config.colour_shortcut:
-            return self.feature_net(torch.cat(own, dim=1))
         factor, rest = divmod(texture.shape[-1], self.config.texture_size)
-        if rest:
+        if rest or not self.config.colour_shortcut:
             factor = 1  # a size of its own, which FeatureNet works on as it is
-        if factor > 1:
-            own = self._filled(*shrink_texture(texture, visibility, factor))
+        coarse = shrink_texture(texture, visibility, factor)
+        if self.config.variant == "cbi":
+            assert pictures is not None
+            return self._complete_coordinates(texture, visibility, pictures[:, 0], factor)
+        own = self._filled(*coarse, self._features_like(coarse[0], pictures))
         feature_map = self.feature_net(torch.cat(own, dim=1))
-        if factor > 1:
-            feature_map = F.interpolate(feature_map, scale_factor=factor, mode="bilinear")
+        if not self.config.colour_shortcut:
+            return feature_map
+        fine = self._filled(texture, visibility) if factor > 1 else own
+        feature_map = enlarge_map(feature_map, factor)
         colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
-        return torch.cat([colours + fine[0], others], dim=1)
+        return torch.cat([colours + fine[0][:, :COLOUR_CHANNELS], others], dim=1)
+
+    def _features_like(
+        self,
+        texture: Float[Tensor, "B 3 T T"],
+        pictures: UInt8[Tensor, "B P 6 S S"] | None,
+    ) -> Float[Tensor, "B E T T"] | None:
+        """Unfold what PhotoNet sees in each picture; the mean of those that see a texel."""
+        if self.photo_net is None or pictures is None:
+            return None
+        features = self.photo_net(normalise_picture(pictures.flatten(0, 1))).float()
+        iuv = pictures[:, :, COLOUR_CHANNELS:].flatten(0, 1)
+        unfolded, seen = extract_texture(features, iuv, self.charts, texture.shape[-1])
+        total, count = (each.unflatten(0, pictures.shape[:2]).sum(1) for each in (unfolded, seen))
+        return (total / count.clamp_min(1)).to(texture.dtype)
+
+    def _complete_coordinates(
+        self,
+        texture: Float[Tensor, "B 3 T T"],
+        visibility: Float[Tensor, "B 1 T T"],
+        picture: UInt8[Tensor, "B 6 S S"],
+        factor: int,
+    ) -> Float[Tensor, "B 5 T T"]:
+        """Colour each hidden texel as the place in the picture that FeatureNet takes it from.
+
+        Returns: The colours; and those places, x and y in [-1, 1] from edge to edge.
+        """
+        assert self.feature_net is not None
+        photo, iuv = picture.tensor_split([COLOUR_CHANNELS], dim=1)
+        side = texture.shape[-1] // factor
+        own = self._filled(*extract_texture(pixel_places(photo), iuv, self.charts, side))
+        places = self.feature_net(torch.cat(own, dim=1)).float()
+        if self.config.colour_shortcut:  # what it starts from is a guess as good as its colours
+            places = places + own[0]
+        found = F.grid_sample(
+            normalise_rgb(photo),
+            places.permute(0, 2, 3, 1),
+            padding_mode="border",
+            align_corners=False,
+        )
+        completed = enlarge_map(torch.cat([found, places], dim=1), factor).to(texture.dtype)
+        colours = torch.where(visibility > 0, texture, completed[:, :COLOUR_CHANNELS])
+        return torch.cat([colours, completed[:, COLOUR_CHANNELS:]], dim=1)
 
     def _filled(
-        self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
+        self,
+        texture: Float[Tensor, "B C T T"],
+        visibility: Float[Tensor, "B 1 T T"],
+        features: Float[Tensor, "B E T T"] | None = None,
     ) -> list[Tensor]:
-        """What FeatureNet reads: the texture, filled if it is to be, and what is known of it."""
+        """What FeatureNet reads: the texture, filled if it is to be, and what is known of it.
+
+        Args:
+            features: Carried beside the texture, and filled with it.
+        """
+        if features is not None:
+            texture = torch.cat([texture, features], dim=1)
         known = [visibility] if self.config.visibility_input else []
         if self.config.prefilled:
             texture, shown = self._mirror_and_fill(texture, visibility)
@@ -168,7 +230,7 @@ class NeuralReRenderer(nn.Module):
             known.append(self._places_like(texture))
         if self.prior is not None:
             prior = F.adaptive_avg_pool2d(self.prior, (texture.shape[2], texture.shape[3]))
-            known.append(prior.to(texture.dtype).expand_as(texture))
+            known.append(prior.to(texture.dtype).expand(len(texture), -1, -1, -1))
         return [texture, *known]
 
     def _mirror_and_fill(
@@ -183,22 +245,26 @@ class NeuralReRenderer(nn.Module):
     ) -> Float[Tensor, "B C H W"]:
         """Compute the feature image R_s->t that RenderNet reads.
 
-        Its channels are the sampled map, the target IUV for `warp-cond`, and with `config.geometry`
-        clearance and position of the place that is nearest, and the distance to the outline, in
-        UNIT_PIXELS.
+        Its channels are the sampled map, where `config.told_iuv` the target IUV, for `dpt` the
+        source's picture, and with `config.geometry` clearance and position of the place that is
+        nearest, and the distance to the outline, in UNIT_PIXELS.
         """
         config = self.config
-        features = sample_features(feature_map, target_iuv, self.charts)
+        looked_up, picture = feature_map.tensor_split([config.sampled_channels], dim=1)
+        features = sample_features(looked_up, target_iuv, self.charts)
         own, places = features, features[:, :0]
         if config.geometry:
             own, places = features[:, :-POSITION_CHANNELS], features[:, -POSITION_CHANNELS:]
-        clearance = own[:, config.feature_outputs :][:, :1]
+        clearance = own[:, config.appearance_channels :][:, :1]
         if config.clearance:
             unit = pixels_per_texel(target_iuv, self.charts) * (UNIT_TEXELS / UNIT_PIXELS)
             clearance *= unit[:, None, None, None]  # in place, so that `own` has it as well
         image = [own]
-        if config.variant == "warp-cond":
+        if config.told_iuv:
             image.append(normalise_iuv(target_iuv))
+        if picture.shape[1]:
+            picture = F.interpolate(picture, target_iuv.shape[2:], mode="nearest-exact")
+            image.append(picture.expand(len(target_iuv), -1, -1, -1))
         if config.geometry:
             body = target_iuv[:, :1] > 0
             nearest = torch.cat([clearance, places], dim=1)
@@ -238,7 +304,7 @@ class NeuralReRenderer(nn.Module):
             body = (
                 feature_image[:, -1:] < 0
                 if self.config.geometry
-                else (feature_image != 0).any(dim=1, keepdim=True)
+                else (feature_image[:, : self.config.warped_channels] != 0).any(1, keepdim=True)
             )
             colours = spread_colours(colours, body, MARGIN_LEVELS)
         # twice: tanh lies in [-1, 1], the difference of two colours in [-2, 2]
@@ -252,3 +318,32 @@ class NeuralReRenderer(nn.Module):
     ) -> Float[Tensor, "B K Ht Wt"]:
         """Encode and render in one go, as in training."""
         return self.render(self.encode(photo, photo_iuv), target_iuv)
+
+
+def normalise_picture(picture: UInt8[Tensor, "B 6 S S"]) -> Float[Tensor, "B 6 S S"]:
+    """Bring RGB, I, U and V to [-1, 1] each, as network input."""
+    photo, iuv = picture.tensor_split([COLOUR_CHANNELS], dim=1)
+    return torch.cat([normalise_rgb(photo), normalise_iuv(iuv)], dim=1)
+
+
+def normalise_rgb(photo: UInt8[Tensor, "B 3 S S"]) -> Float[Tensor, "B 3 S S"]:
+    """Bring 0..255 to [-1, 1]."""
+    return photo.float() / 127.5 - 1
+
+
+def pixel_places(photo: Shaped[Tensor, "B _ H W"]) -> Float[Tensor, "B 2 H W"]:
+    """Where each pixel's centre lies: x and y, -1 and 1 being the photo's edges."""
+    height, width = photo.shape[2:]
+    y, x = (
+        (torch.arange(count, device=photo.device) + 0.5) * (2 / count) - 1
+        for count in (height, width)
+    )
+    grid = torch.stack(torch.meshgrid(x, y, indexing="xy"))
+    return grid.expand(len(photo), -1, -1, -1)
+
+
+def enlarge_map(feature_map: Float[Tensor, "B D T T"], factor: int) -> Tensor:
+    """Enlarge a map so many times, bilinearly."""
+    if factor == 1:
+        return feature_map
+    return F.interpolate(feature_map, scale_factor=factor, mode="bilinear")

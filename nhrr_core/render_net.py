@@ -7,6 +7,8 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from nhrr_core.config import RenderSizes
+
 LAST_LAYERS = 3
 """How many there are after the norms: padding, 7x7 and tanh."""
 
@@ -75,39 +77,31 @@ class RenderNet(nn.Module):
     """Pix2PixHD's global generator: 7x7, down blocks, residual blocks, up blocks, 7x7, tanh.
 
     Args:
-        width: Channels of the first convolution; they double at each down block.
-        shortcut: Whether the last convolution reads the network's input, too.
-        even: Whether the up blocks can draw no checkerboard, see `UpConvolution`.
+        sizes: `width` is the channels of the first convolution, which double at each down block;
+            with `shortcut` the last convolution reads the network's input, too; with `even` the up
+            blocks can draw no checkerboard, see `UpConvolution`.
     Source: the paper, Sec. 3.4, Eq. 3; layer shapes from Pix2PixHD (Wang et al., CVPR 2018).
         Departs from it: `shortcut` and `even`, off by default.
     """
 
-    def __init__(
-        self,
-        *,
-        inputs: int,
-        outputs: int,
-        width: int,
-        down_blocks: int,
-        residual_blocks: int,
-        shortcut: bool = False,
-        even: bool = False,
-    ) -> None:
+    def __init__(self, sizes: RenderSizes) -> None:
         super().__init__()
-        self.shortcut = shortcut
-        layers: list[nn.Module] = [nn.ReflectionPad2d(3), nn.Conv2d(inputs, width, 7)]
+        width = sizes.width
+        self.shortcut = sizes.shortcut
+        layers: list[nn.Module] = [nn.ReflectionPad2d(3), nn.Conv2d(sizes.inputs, width, 7)]
         layers += [nn.InstanceNorm2d(width), nn.ReLU(inplace=True)]
-        for i in range(down_blocks):
+        for i in range(sizes.down_blocks):
             wide = width * 2 ** (i + 1)
             layers += [nn.Conv2d(wide // 2, wide, 3, stride=2, padding=1)]
             layers += [nn.InstanceNorm2d(wide), nn.ReLU(inplace=True)]
-        layers += [ResidualBlock(width * 2**down_blocks) for _ in range(residual_blocks)]
-        for i in reversed(range(down_blocks)):
+        widest = width * 2**sizes.down_blocks
+        layers += [ResidualBlock(widest) for _ in range(sizes.residual_blocks)]
+        for i in reversed(range(sizes.down_blocks)):
             narrow = width * 2**i
-            layers += [UpConvolution(narrow * 2, narrow, even=even)]
+            layers += [UpConvolution(narrow * 2, narrow, even=sizes.even)]
             layers += [nn.InstanceNorm2d(narrow), nn.ReLU(inplace=True)]
-        read = width + inputs if shortcut else width
-        layers += [nn.ReflectionPad2d(3), nn.Conv2d(read, outputs, 7), nn.Tanh()]
+        read = width + sizes.inputs * sizes.shortcut
+        layers += [nn.ReflectionPad2d(3), nn.Conv2d(read, sizes.outputs, 7), nn.Tanh()]
         self.layers = nn.Sequential(*layers)
 
     def forward(self, features: Float[Tensor, "B C H W"]) -> Float[Tensor, "B K H W"]:

@@ -99,6 +99,7 @@ def load_source(path: Path, texture_size: int) -> Source:
         clearance = None
         if "clearance" in file.shapes:
             clearance = file.read("clearance", "F32", (2, CLEARANCE_SIZE, CLEARANCE_SIZE))
+        made_of = file.facts.get("made of")
     return Source(
         picture.photo,
         picture.iuv,
@@ -109,6 +110,8 @@ def load_source(path: Path, texture_size: int) -> Source:
         clearance=clearance,
         notes=(*file.notes, *note),
         kept=path,
+        # of several only the first is there, and that would be half of what was seen
+        pictures=(picture,) if isinstance(made_of, list) and len(made_of) == 1 else (),
     )
 
 

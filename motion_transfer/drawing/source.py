@@ -23,6 +23,7 @@ from motion_transfer.drawing.person import (
 from motion_transfer.drawing.textures import enlarge, merge_textures, pick_nearest
 from motion_transfer.drawing.unfolding import extract_texture, keep_parts
 from motion_transfer.drawing.views import View, merge_views, rate_texels
+from motion_transfer.drawing.window import BEYOND_THE_PHOTO, cut_picture, plan_window
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import ChannelOrder
@@ -72,6 +73,7 @@ class Source:
         clearance: Of clothes and hair, see `nhrr_core.unfold_clearance`; 0 where it is not known.
         notes: What the user should know of how the photos are read, in sentences.
         kept: The file that it was read from, see `kept_source`, which holds feature maps of it.
+        pictures: What the texture was unfolded from, garments last; none where that is not known.
     """
 
     photo: Photo
@@ -83,6 +85,7 @@ class Source:
     clearance: Float32[np.ndarray, "2 128 128"] | None = None
     notes: tuple[str, ...] = ()
     kept: Path | None = None
+    pictures: tuple[SourcePicture, ...] = ()
 
 
 def unfold_source(
@@ -110,6 +113,7 @@ def unfold_source(
         person.alpha,
         _mean_clearance(pictures),
         tuple(dict.fromkeys(notes)),  # those of a video are the same for each of its frames
+        pictures=tuple(pictures),
     )
 
 
@@ -132,6 +136,10 @@ def undress(source: Source, parts: Collection[int]) -> Source:
         visibility=left(source.visibility),
         clearance=None if source.clearance is None else left(source.clearance),
         kept=None,
+        pictures=tuple(
+            replace(each, parts=tuple(part for part in each.parts if part not in parts))
+            for each in source.pictures
+        ),
     )
 
 
@@ -164,6 +172,7 @@ def dress(source: Source, garments: Sequence[SourcePicture]) -> Source:
         clearance=clearance,
         notes=tuple(dict.fromkeys(notes)),
         kept=None,
+        pictures=(*source.pictures, *garments),
     )
 
 
@@ -212,6 +221,17 @@ def _list_notes(picture: SourcePicture) -> list[str]:
     blends.add(picture.iuv)
     warning = blends.warn(f"the IUV of {picture.photo.path}")
     return [*picture.photo.notes, *([warning] if warning else [])]
+
+
+def cut_source(picture: SourcePicture, size: int) -> UInt8[np.ndarray, "6 S S"]:
+    """Cut a photo out around its person, and the (I, U, V) of what is taken from there.
+
+    Networks read that which look at the photo itself.
+    """
+    window = plan_window([bounding_box(picture.iuv)])
+    rgb = cut_picture(window, picture.photo.rgb, size, BEYOND_THE_PHOTO)
+    iuv = window.cut(keep_parts(picture.iuv, picture.parts), size)
+    return np.concatenate([rgb, iuv], axis=-1).transpose(2, 0, 1)
 
 
 def unfold_picture(

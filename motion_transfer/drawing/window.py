@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -23,6 +23,8 @@ DRAWN_UNSCALED = (0.75, 2.5)
 
 TRAINED_UNSCALED = (0.75, 1.25)
 """It learns from those: up to here, the person of a window fits into an image."""
+
+BEYOND_THE_PHOTO = (255, 255, 255)  # as the renderer's default background
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,25 @@ class Window:
         if size == self.side:
             return square
         return cv2.resize(square, (size, size), interpolation=cv2.INTER_NEAREST_EXACT)
+
+
+def cut_picture(
+    window: Window, picture: np.ndarray, size: int, fill: Sequence[int] | int
+) -> UInt8[np.ndarray, "*shape"]:
+    """Cut the window's content of a photo or alpha, at size x size.
+
+    Args:
+        fill: What is seen beyond the photo's edges.
+    """
+    rows, columns, own_rows, own_columns = window.visible(*picture.shape[:2])
+    square = np.empty((window.side, window.side, *picture.shape[2:]), np.uint8)
+    square[:] = fill
+    square[own_rows, own_columns] = picture[rows, columns]
+    if size == window.side:
+        return square
+    # for colours and alpha; IUV cannot be averaged, `Window.cut` is for that
+    kind = cv2.INTER_AREA if size < window.side else cv2.INTER_CUBIC
+    return cv2.resize(square, (size, size), interpolation=kind)
 
 
 def plan_window(boxes: Iterable[Box | None]) -> Window:

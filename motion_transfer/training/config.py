@@ -102,7 +102,10 @@ class ModelSettings:
         metavar="lite|paper",
     )
     variant: str = option(
-        "--variant", "Model", "full (default), no-int, ip, warp or warp-cond.", metavar="NAME"
+        "--variant",
+        "Model",
+        "full (default), no-int, ip, warp, warp-cond, texture-features, cbi or dpt.",
+        metavar="NAME",
     )
 
 
@@ -241,7 +244,7 @@ class OptimiserSettings:
         ema_decay: Of the averaged weights, which are what is exported; 0: no average.
         half_size: The share of the run, its beginning, at half the sides of textures and images:
             a quarter of the work.
-        inpainting: The share of the run that is the first stage of `ip`.
+        inpainting: The share of the run in which FeatureNet of `ip`, `cbi`, `dpt` learns alone.
     """
 
     learning_rate: Factor = 2e-4
@@ -365,13 +368,8 @@ class TrainConfig:
         return progress >= self.losses.adversarial_from
 
     def is_inpainting(self, progress: float) -> bool:
-        """Tell whether that is the first stage of `ip`; other variants have none."""
-        return self.model.variant == "ip" and progress < self.optimiser.inpainting
-
-    @property
-    def uses_texture_loss(self) -> bool:
-        """Whether the texture is supervised: the warps learn none, and No-Int leaves that out."""
-        return self.model.variant in ("full", "ip")
+        """Tell whether FeatureNet is trained alone by then, as `ip`, `cbi` and `dpt` begin."""
+        return self.model.inpaints_first and progress < self.optimiser.inpainting
 
     def learning_rate(self, progress: float) -> float:
         """Compute the learning rate of the update before which that share of the run is done."""

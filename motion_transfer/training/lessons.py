@@ -22,16 +22,24 @@ import torch
 from jaxtyping import Bool, Float, Float64, UInt8
 from torch import Tensor
 
+from motion_transfer.drawing.engines.torch_engine import encode_source
 from motion_transfer.drawing.outline import stand_out
 from motion_transfer.drawing.person import bounding_box, occupancy
 from motion_transfer.drawing.source import Source, SourcePicture, unfold_source, unfold_views
 from motion_transfer.drawing.textures import average
 from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
 from motion_transfer.drawing.views import equalise_light
-from motion_transfer.drawing.window import DRAWN_UNSCALED, SIDE_STEP, Window, plan_window
+from motion_transfer.drawing.window import (
+    BEYOND_THE_PHOTO,
+    DRAWN_UNSCALED,
+    SIDE_STEP,
+    Window,
+    cut_picture,
+    plan_window,
+)
 from motion_transfer.training.metrics import SHOWN_TEXELS
 from motion_transfer.training.pictures import Image, Plane
-from motion_transfer.training.samples import BEYOND_THE_PHOTO, cut_picture, to_tensor
+from motion_transfer.training.samples import to_tensor
 from motion_transfer.training.step import Batch
 from nhrr_core import NeuralReRenderer
 from nhrr_core.config import COLOUR_CHANNELS
@@ -152,13 +160,7 @@ class Lessons:
 
     def _encode(self, source: Source) -> Float[Tensor, "1 D T T"]:
         """Compute the feature map of a source as a run would."""
-        texture, visibility = map(self._take, (source.texture, source.visibility))
-        clearance = None if source.clearance is None else self._take(source.clearance)
-        with torch.no_grad():
-            return self._model.encode_texture(texture, visibility, clearance)
-
-    def _take(self, values: Float[np.ndarray, "C T T"]) -> Float[Tensor, "1 C T T"]:
-        return torch.from_numpy(values)[None].to(self._device)
+        return encode_source(self._model, source).to(self._device).clone()  # fit for gradients
 
     def _draw(self, likeness: Likeness) -> Batch:
         """Cut a photo, at a size and a place that are left to chance."""

@@ -19,12 +19,13 @@ import numpy as np
 from jaxtyping import Float16, UInt8
 
 from motion_transfer.drawing.outline import clearance_of
-from motion_transfer.drawing.source import trim_to_alpha
+from motion_transfer.drawing.source import SourcePicture, cut_source, trim_to_alpha
 from motion_transfer.errors import MotionTransferError, TrainingError
 from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.samples import cut_target
 from motion_transfer.training.sources import StreamedPairs, StreamedPhoto
 from motion_transfer.training.speed import keep_memory
+from nhrr_core.config import PICTURE_CHANNELS
 from nhrr_core.parts import ALL_PARTS
 
 MOST_SKIPPED = 5
@@ -49,6 +50,7 @@ class PaintedPerson:
         photo, photo_iuv: What a texture is unfolded from; the IUV is trimmed as alpha says.
         clearance: Of each photo, see `nhrr_core.unfold_clearance`.
         image, iuv, alpha: Crops as the networks draw them, `image` over the background.
+        picture: Crops as networks read them that look at the photo itself; empty for others.
     """
 
     photo: UInt8[np.ndarray, "V 3 P P"]
@@ -57,6 +59,7 @@ class PaintedPerson:
     image: UInt8[np.ndarray, "V 3 S S"]
     iuv: UInt8[np.ndarray, "V 3 S S"]
     alpha: UInt8[np.ndarray, "V 1 S S"]
+    picture: UInt8[np.ndarray, "V 6 _ _"]
 
 
 @dataclass(frozen=True)
@@ -75,11 +78,15 @@ class Painter:
             assert picture.alpha is not None  # people always have one
             crop = cut_target(picture, size, data, random)
             assert crop.alpha is not None
-            clearance = clearance_of(picture.as_photo(), picture.iuv, ALL_PARTS)
+            shown = SourcePicture(picture.as_photo(), picture.iuv)
+            clearance = clearance_of(shown.photo, shown.iuv, ALL_PARTS)
+            read = np.empty((PICTURE_CHANNELS, 0, 0), np.uint8)
+            if self.config.model.reads_photo:
+                read = cut_source(shown, size)
             trimmed = trim_to_alpha(picture.iuv, picture.alpha)
             flat = (picture.rgb, trimmed, crop.rgb, crop.iuv, crop.alpha[..., None])
             photo, photo_iuv, image, iuv, alpha = (plane.transpose(2, 0, 1) for plane in flat)
-            views.append((photo, photo_iuv, clearance.astype(np.float16), image, iuv, alpha))
+            views.append((photo, photo_iuv, clearance.astype(np.float16), image, iuv, alpha, read))
         return PaintedPerson(*(np.stack(planes) for planes in zip(*views, strict=True)))
 
 

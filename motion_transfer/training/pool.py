@@ -20,7 +20,7 @@ from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.painters import PaintedPerson, Painters
 from motion_transfer.training.samples import UNKNOWN_CLEARANCE, background_colour
 from nhrr_core import extract_texture, load_uv_layout
-from nhrr_core.config import CLEARANCE_SIZE
+from nhrr_core.config import CLEARANCE_SIZE, PICTURE_CHANNELS
 
 FIRST_PEOPLE, FIRST_OF_BATCH = 32, 4
 """So many, or so many for each of a batch if that is less, are there before the first step: enough
@@ -145,7 +145,9 @@ class PeoplePool:
 
         batch = {"target_image": colours("image", target)}
         batch["target_iuv"] = self._kept["iuv"][person, target]
-        roles = {"source": source, **({"target": target} if config.uses_texture_loss else {})}
+        roles = {"source": source}
+        if config.model.supervises_texture:
+            roles["target"] = target
         for role, view in roles.items():
             visibility = self._kept["visibility"][person, view].float()
             batch[f"{role}_texture"] = colours("texture", view) * visibility
@@ -158,6 +160,8 @@ class PeoplePool:
             known = torch.rand(count, 1, 1, 1, generator=self._random, device=self._device)
             clearance = self._kept["clearance"][person, source].float()
             batch["source_clearance"] = clearance * (known >= UNKNOWN_CLEARANCE)
+        if config.model.reads_photo:
+            batch["source_pictures"] = self._kept["picture"][person, source][:, None]
         return batch
 
 
@@ -175,6 +179,8 @@ def _kinds(config: TrainConfig) -> dict[str, tuple[tuple[int, ...], torch.dtype]
         kinds["alpha"] = ((views, 1, *image), UINT8)
     if model.clearance:
         kinds["clearance"] = ((views, 2, CLEARANCE_SIZE, CLEARANCE_SIZE), FLOAT16)
+    if model.reads_photo:
+        kinds["picture"] = ((views, PICTURE_CHANNELS, *image), UINT8)
     return kinds
 
 

@@ -14,13 +14,12 @@ import torch
 from jaxtyping import UInt8
 from torch import Tensor
 
+from motion_transfer.drawing.window import BEYOND_THE_PHOTO, cut_picture
 from motion_transfer.events import Notice
 from motion_transfer.option import parse_colour
 from motion_transfer.training.pairs import Pairs
 from motion_transfer.training.samples import (
-    BEYOND_THE_PHOTO,
     TrainingSamples,
-    cut_picture,
     person_window,
 )
 from nhrr_core import NeuralReRenderer
@@ -105,7 +104,10 @@ def draw_grid(
     for photo, tensors in previews:
         sample = {name: value[None].to(device) for name, value in tensors.items()}
         feature_map = model.encode_texture(
-            sample["source_texture"], sample["source_visibility"], sample.get("source_clearance")
+            sample["source_texture"],
+            sample["source_visibility"],
+            sample.get("source_clearance"),
+            sample.get("source_pictures"),
         )
         drawn = _pixels(model.render(feature_map, sample["target_iuv"])[0])
         if drawn.shape[-1] == 4:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,8 +23,14 @@ from torch.utils.data import DataLoader, Dataset
 
 from motion_transfer.drawing.outline import clearance_of
 from motion_transfer.drawing.person import bounding_box
-from motion_transfer.drawing.source import SourcePicture, unfold_picture
-from motion_transfer.drawing.window import TRAINED_UNSCALED, Window, plan_window
+from motion_transfer.drawing.source import SourcePicture, cut_source, unfold_picture
+from motion_transfer.drawing.window import (
+    BEYOND_THE_PHOTO,
+    TRAINED_UNSCALED,
+    Window,
+    cut_picture,
+    plan_window,
+)
 from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.publish import name_beside
@@ -33,10 +39,9 @@ from motion_transfer.training.config import DataSettings, SpeedSettings, TrainCo
 from motion_transfer.training.pairs import Pair, Pairs, flat_stem
 from motion_transfer.training.pictures import Image, PersonPicture, Picture, Plane, lay_over
 from nhrr_core import shrink_texture
-from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE
+from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE, COLOUR_CHANNELS
 from nhrr_core.parts import ALL_PARTS
 
-BEYOND_THE_PHOTO = (255, 255, 255)  # as the renderer's default background
 UNKNOWN_CLEARANCE = 0.15
 """The share of the samples whose clearance is withheld, as it is unknown of most photos without
 alpha; chosen."""
@@ -75,7 +80,8 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
         Returns: `source_texture` 3 x T x T in [-1, 1] and `source_visibility` 1 x T x T;
             `target_image` 3 x S x S in [-1, 1], `target_iuv` uint8 3 x S x S; where wanted
             `target_alpha` 1 x S x S and `target_background` 3, both in [-1, 1],
-            `source_clearance` 2 x t x t, `target_texture` and `target_visibility`.
+            `source_clearance` 2 x t x t, `source_pictures` uint8 1 x 6 x S x S, `target_texture`
+            and `target_visibility`.
         Raises: InputError for a file that broke meanwhile.
         """
         random = np.random.default_rng((self._config.run.seed, 1, number))
@@ -103,16 +109,20 @@ class TrainingSamples(Dataset[dict[str, Tensor]]):
             sample["target_alpha"] = to_tensor(crop.alpha)
             if (colour := background_colour(data)) is not None:
                 sample["target_background"] = colour
-        source = pair.source.load() if model.clearance else None
+        source = pair.source.load() if model.clearance or model.reads_photo else None
         sample |= self._texture("source", pair.source, shrink, source)
-        if source:
+        if source and model.reads_photo:
+            shown = SourcePicture(source.as_photo(), source.iuv)
+            picture = cut_source(shown, model.image_size // shrink)
+            sample["source_pictures"] = torch.from_numpy(picture)[None]
+        if source and model.clearance:
             known = random is None or random.random() >= UNKNOWN_CLEARANCE
             sample["source_clearance"] = (
                 torch.from_numpy(clearance_of(source.as_photo(), source.iuv, ALL_PARTS))
                 if known
                 else torch.zeros(CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
             )
-        if self._config.uses_texture_loss:
+        if model.supervises_texture:
             sample |= self._texture("target", pair.target, shrink, target)
         return sample
 
@@ -196,25 +206,6 @@ def person_window(picture: PersonPicture) -> Window:
     return plan_window([bounding_box(picture.iuv)])
 
 
-def cut_picture(
-    window: Window, picture: np.ndarray, size: int, fill: Sequence[int] | int
-) -> UInt8[np.ndarray, "*shape"]:
-    """Cut the window's content of a photo or alpha, at size x size.
-
-    Args:
-        fill: What is seen beyond the photo's edges.
-    """
-    rows, columns, own_rows, own_columns = window.visible(*picture.shape[:2])
-    square = np.empty((window.side, window.side, *picture.shape[2:]), np.uint8)
-    square[:] = fill
-    square[own_rows, own_columns] = picture[rows, columns]
-    if size == window.side:
-        return square
-    # for colours and alpha; IUV cannot be averaged, `Window.cut` is for that
-    kind = cv2.INTER_AREA if size < window.side else cv2.INTER_CUBIC
-    return cv2.resize(square, (size, size), interpolation=kind)
-
-
 def halve(batch: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Halve the sides of a batch's textures and images, which saves three quarters of the work."""
     halved = dict(batch)
@@ -225,6 +216,10 @@ def halve(batch: Mapping[str, Tensor]) -> dict[str, Tensor]:
     for name in {"target_image", "target_alpha"} & batch.keys():
         halved[name] = F.avg_pool2d(batch[name], 2)
     halved["target_iuv"] = batch["target_iuv"][..., 1::2, 1::2]  # as `Window.cut` chooses
+    if "source_pictures" in batch:
+        rgb, iuv = batch["source_pictures"].tensor_split([COLOUR_CHANNELS], dim=2)
+        rgb = F.avg_pool2d(rgb.flatten(0, 1).float(), 2).round().to(torch.uint8)
+        halved["source_pictures"] = torch.cat([rgb[:, None], iuv[..., 1::2, 1::2]], dim=2)
     return halved
 
 

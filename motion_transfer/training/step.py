@@ -71,10 +71,11 @@ class Generator(nn.Module):
         visibility: Float[Tensor, "B 1 T T"],
         target_iuv: UInt8[Tensor, "B 3 S S"] | None,
         clearance: Float[Tensor, "B 2 t t"] | None = None,
+        pictures: UInt8[Tensor, "B P 6 S S"] | None = None,
     ) -> Drawn:
         """Draw a batch; only the feature map where there is no target."""
         # the grid of the sampler has more digits than bf16
-        feature_map = self.model.encode_texture(texture, visibility, clearance).float()
+        feature_map = self.model.encode_texture(texture, visibility, clearance, pictures).float()
         if target_iuv is None:
             return Drawn(feature_map, None, None)
         feature_image = self.model.feature_image(feature_map, target_iuv)
@@ -268,12 +269,12 @@ class Players:
 
 
 def set_stage(model: NeuralReRenderer, *, inpainting: bool) -> None:
-    """Train or freeze FeatureNet, as the two stages of `ip` ask; other variants stay as they are.
+    """Train or freeze FeatureNet, as the two stages of some variants ask; others have one.
 
     Source: the paper, Sec. 4.4, IP: the inpainting network is trained first, then fixed.
     """
     model.train()
-    if model.config.variant == "ip" and model.feature_net is not None:
+    if model.config.inpaints_first and model.feature_net is not None:
         model.feature_net.requires_grad_(inpainting)
         model.feature_net.train(inpainting)  # its batch norms' averages are fixed as well
 
@@ -307,6 +308,7 @@ def update(
             batch["source_visibility"],
             None if inpainting else batch["target_iuv"],
             batch.get("source_clearance"),
+            batch.get("source_pictures"),
         )
         judge = discriminator and arithmetic.without_hooks(discriminator)
         terms = generator_terms(

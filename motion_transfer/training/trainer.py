@@ -360,9 +360,9 @@ def make_accelerator(config: TrainConfig) -> Accelerator:
     return Accelerator(
         mixed_precision="bf16" if dtype == torch.bfloat16 else "no",
         gradient_accumulation_steps=config.optimiser.accumulation,
-        # in the first stage of `ip` RenderNet takes no part, in the second FeatureNet
+        # in the first stage RenderNet takes no part, in the second FeatureNet
         kwargs_handlers=[
-            DistributedDataParallelKwargs(find_unused_parameters=config.model.variant == "ip")
+            DistributedDataParallelKwargs(find_unused_parameters=config.model.inpaints_first)
         ],
     )
 

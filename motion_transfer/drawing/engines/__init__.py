@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 PRECISIONS = ("int8", "bf16", "f32")
 """The fastest first."""
 
+WITHOUT_GRAPH = ("dpt",)
+"""Variants for which no graph is built: they are there to be compared with."""
+
 DEVICES = re.compile(r"cpu|cuda(:\d+)?")
 CUDA_FILES = ("/dev/nvidiactl", "/dev/dxg")  # Linux's driver, and that of Windows below it
 
@@ -114,8 +117,14 @@ def choose_execution(wish: Wish, info: CheckpointInfo) -> Execution:
     from motion_transfer.weights.checkpoint import read_ranges
 
     device = wish.device or _best_device(wish.engine)
-    name = wish.engine or ("torch" if device != "cpu" else _best_cpu_engine())
+    in_torch = device != "cpu" or info.config.variant in WITHOUT_GRAPH
+    name = wish.engine or ("torch" if in_torch else _best_cpu_engine())
     row = ENGINES[name]
+    if name != "torch" and info.config.variant in WITHOUT_GRAPH:
+        raise InputError(
+            f"--engine {name} does not run variant {info.config.variant} of weights {info.path};"
+            " choose --engine torch"
+        )
     if not row.installed:
         raise InputError(f"--engine {name} needs {row.package}; pip install {row.package}")
     if device != "cpu":

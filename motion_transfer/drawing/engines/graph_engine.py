@@ -32,7 +32,12 @@ from motion_transfer.drawing.graphs.whole import (
     build_sampler,
 )
 from motion_transfer.drawing.source import Source
-from motion_transfer.weights.checkpoint import inspect_checkpoint, read_checkpoint, read_ranges
+from motion_transfer.weights.checkpoint import (
+    inspect_checkpoint,
+    load_checkpoint,
+    read_checkpoint,
+    read_ranges,
+)
 from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE
 
 
@@ -54,7 +59,7 @@ class GraphEngine(ABC):
     occupies: Occupied = "core"
 
     def __init__(self, weights: Path, execution: Execution) -> None:
-        self.execution = execution
+        self.execution, self._weights = execution, weights
         self.config, self._tensors = read_checkpoint(weights)
         whole = execution.precision == "int8"
         self._ranges = read_ranges(inspect_checkpoint(weights)) if whole else None
@@ -78,6 +83,10 @@ class GraphEngine(ABC):
         return 1
 
     def encode(self, source: Source) -> FeatureMap:
+        if self.config.reads_photo:  # once per source, and by research variants alone
+            from motion_transfer.drawing.engines.torch_engine import encode_source
+
+            return encode_source(load_checkpoint(self._weights), source).numpy()
         clearance = source.clearance
         if clearance is None:
             clearance = np.zeros((CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32)
@@ -88,7 +97,8 @@ class GraphEngine(ABC):
     def prepare(self, sides: Collection[int]) -> None:
         for side in sides:
             self._painter(side)
-        _ = self._encoder
+        if not self.config.reads_photo:
+            _ = self._encoder
 
     @property
     def _encoder(self) -> Session:

@@ -16,7 +16,8 @@ from torch import Tensor
 from motion_transfer.drawing.engines import Execution
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, LANES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.threads import one_torch_thread
-from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.source import Source, cut_source
+from motion_transfer.errors import InputError
 from motion_transfer.weights.checkpoint import load_checkpoint
 from nhrr_core import ModelConfig, NeuralReRenderer
 from nhrr_core.config import IUV_CHANNELS
@@ -194,6 +195,7 @@ def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
 
     Measured: FeatureNet's last bits depend on the number of threads, so it gets one, wherever it
     runs; RenderNet's do not.
+    Raises: InputError if the model reads photos, and the source does not hold them.
     """
     device = next(model.parameters()).device
     known = (source.texture, source.visibility, source.clearance)
@@ -201,5 +203,21 @@ def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
         None if array is None else torch.from_numpy(array)[None].to(device) for array in known
     )
     assert texture is not None and visibility is not None
+    pictures = cut_pictures(source, model.config)
     with one_torch_thread(), torch.inference_mode():
-        return model.encode_texture(texture, visibility, clearance).cpu()
+        shown = None if pictures is None else torch.from_numpy(pictures)[None].to(device)
+        return model.encode_texture(texture, visibility, clearance, shown).cpu()
+
+
+def cut_pictures(source: Source, config: ModelConfig) -> UInt8[np.ndarray, "P 6 S S"] | None:
+    """Cut out the photos that a model reads; None if it reads none. Raises: InputError."""
+    if not config.reads_photo:
+        return None
+    shown = [picture for picture in source.pictures if picture.iuv[..., 0].any()]
+    if not shown:
+        raise InputError(
+            f"source {source.kept or source.photo.path} does not hold all of its photos, which"
+            f" weights of variant {config.variant} read; give the photos, or save it again with"
+            " `mt source save --weights`"
+        )
+    return np.stack([cut_source(picture, config.image_size) for picture in shown])

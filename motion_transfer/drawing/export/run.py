@@ -74,6 +74,11 @@ def export_model(weights: Path, options: ExportOptions) -> list[Path]:
             f"--precision int8: weights {path} do not say of which ranges their numbers are; add"
             f" that with mt calibrate {path}, or choose another"
         )
+    if info.config.reads_photo:
+        raise InputError(
+            f"weights {path} are of variant {info.config.variant}, which reads the photo itself and"
+            " is not exported; choose weights of another variant"
+        )
     digest = digest_weights(path)
     notes = {
         "format": FORMAT,

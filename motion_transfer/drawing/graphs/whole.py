@@ -160,7 +160,7 @@ def build_painter(
             graph.input(UNIT, FLOAT, (1, 1, 1, 1))
     else:
         _map_input(graph, config)
-    iuv = _iuv_input(graph) if not looked_up or config.variant == "warp-cond" else ""
+    iuv = _iuv_input(graph) if not looked_up or config.told_iuv else ""
     features, colours = _append_sampler(graph, config, iuv, looked_up=looked_up, starts_frames=True)
     drawn, read = append_render_net(graph, features, weights, config, ranges)
     frame = drawn if colours is None else _blend(graph, drawn, colours, config)
@@ -210,7 +210,7 @@ def _append_sampler(
         sampled, body = look_up(graph, FEATURE_MAP, iuv)
         distance = signed_distance(graph, body, OUTLINE_PIXELS) if config.geometry else ""
         unit = ""
-    learned, end = config.feature_outputs, config.map_channels
+    learned, end = config.appearance_channels, config.map_channels
     image = [graph.part(sampled, 0, learned)]
     nearest = []
     if config.clearance:
@@ -220,7 +220,7 @@ def _append_sampler(
         clearance = graph("Mul", graph.part(sampled, learned, learned + 1), unit)
         image += [clearance, graph.part(sampled, learned + 1, learned + 2)]
         nearest.append(clearance)
-    if config.variant == "warp-cond":
+    if config.told_iuv:
         codes = graph("Cast", graph("Transpose", iuv, perm=[0, 3, 1, 2]), to=FLOAT)
         scale = np.array([2 / PART_COUNT, 2 / 255, 2 / 255], np.float32)[:, None, None]
         image.append(graph("Sub", graph("Mul", codes, scale), 1))

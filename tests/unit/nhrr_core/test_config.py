@@ -160,6 +160,9 @@ def test_is_frozen_keyword_only_and_hashable() -> None:
         ("ip", True, 3, 3),
         ("warp", False, 3, 3),
         ("warp-cond", False, 3, 6),
+        ("texture-features", True, 16, 16),
+        ("cbi", True, 5, 8),
+        ("dpt", True, 9, 12),
     ],
 )
 def test_channels_of_a_variant(

@@ -24,10 +24,17 @@ from nhrr_core import (
     shrink_texture,
 )
 from nhrr_core.clearance import pixels_per_texel
-from nhrr_core.config import MARGIN_LEVELS, OUTLINE_PIXELS, UNIT_PIXELS, UNIT_TEXELS
+from nhrr_core.config import (
+    MARGIN_LEVELS,
+    OUTLINE_PIXELS,
+    PHOTO_FEATURES,
+    UNIT_PIXELS,
+    UNIT_TEXELS,
+)
+from nhrr_core.dense_pose_transfer import DirectAndBlending
+from nhrr_core.model import pixel_places
 from nhrr_core.sampling import signed_distance, spread_colours
 
-FIRST = "render_net.layers.1.weight"
 SMALL = ModelConfig(
     feature_width=2, render_width=4, residual_blocks=1, texture_size=64, image_size=32
 )
@@ -58,7 +65,16 @@ def targets(iuv: Tensor) -> Tensor:
 @pytest.mark.parametrize("alpha", [False, True])
 @pytest.mark.parametrize(
     ("variant", "map_channels", "render_inputs"),
-    [("full", 16, 16), ("no-int", 16, 16), ("ip", 3, 3), ("warp", 3, 3), ("warp-cond", 3, 6)],
+    [
+        ("full", 16, 16),
+        ("no-int", 16, 16),
+        ("ip", 3, 3),
+        ("warp", 3, 3),
+        ("warp-cond", 3, 6),
+        ("texture-features", 16, 16),
+        ("cbi", 5, 8),
+        ("dpt", 9, 12),
+    ],
 )
 def test_variant(
     photo: Tensor,
@@ -86,12 +102,14 @@ def test_first_convolutions_have_the_variant_s_channels(variant: str) -> None:
     model = small(variant=variant)
     entry = next(m for m in model.render_net.modules() if isinstance(m, nn.Conv2d))
     expected = {"full": 16, "no-int": 16, "ip": 3, "warp": 3, "warp-cond": 6}
+    expected |= {"texture-features": 16, "cbi": 8, "dpt": 9}  # the direct one: no warped colours
     assert entry.in_channels == expected[variant]
     if variant.startswith("warp"):
         assert model.feature_net is None
     else:
         assert model.feature_net is not None
-        assert model.feature_net.entry[0].in_channels == 4
+        read = {"texture-features": 12, "cbi": 3}
+        assert model.feature_net.entry[0].in_channels == read.get(variant, 4)
 
 
 def test_paper_sized_model_has_d_16() -> None:
@@ -241,6 +259,12 @@ def test_warp_cond_sees_the_target_iuv_too(targets: Tensor) -> None:
     assert torch.equal(image[:, 3:], normalise_iuv(targets))
 
 
+def pictures(photo: Tensor, iuv: Tensor) -> Tensor:
+    """One picture of each person, as those variants read it that look at the photo."""
+    levels = ((photo + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
+    return torch.cat([levels, iuv], dim=1)[:, None]
+
+
 @pytest.fixture
 def clearance() -> Tensor:
     """Of clothes that stand off the whole body alike, measured at some texels."""
@@ -255,15 +279,20 @@ def test_render_net_is_told_the_clearance_in_its_own_pixels(
 ) -> None:
     model = small(variant=variant, clearance=True)
     plain = small(variant=variant)
-    plain.load_state_dict({**model.state_dict(), FIRST: plain.state_dict()[FIRST]})
+    state = model.state_dict()
+    encoders = {name: state[name] for name in state if not name.startswith("render_net")}
+    plain.load_state_dict(encoders, strict=False)
     texture, visibility = extract_texture(photo, iuv, model.charts, 64)
-    feature_map = model.encode_texture(texture, visibility, clearance)
-    assert torch.equal(feature_map[:, :-2], plain.encode_texture(texture, visibility))
-    assert torch.allclose(feature_map[:, -2], torch.tensor(0.75))
-    assert torch.equal(feature_map[:, -1], torch.ones(1, 64, 64))
+    shown = pictures(photo, iuv) if model.config.reads_photo else None
+    feature_map = model.encode_texture(texture, visibility, clearance, shown)
+    without = plain.encode_texture(texture, visibility, pictures=shown)
+    at = model.config.appearance_channels
+    assert torch.equal(torch.cat([feature_map[:, :at], feature_map[:, at + 2 :]], 1), without)
+    assert torch.allclose(feature_map[:, at], torch.tensor(0.75))
+    assert torch.equal(feature_map[:, at + 1], torch.ones(1, 64, 64))
     for scale in (1, 2):
         target = iuv.repeat_interleave(scale, 2).repeat_interleave(scale, 3)
-        image = model.feature_image(feature_map, target)[:, plain.config.map_channels :]
+        image = model.feature_image(feature_map, target)[:, plain.config.sampled_channels :]
         body = target[:, 0] > 0
         pixels = 0.75 * UNIT_TEXELS * pixels_per_texel(target, model.charts) / UNIT_PIXELS
         assert torch.allclose(image[:, 0][body], pixels, rtol=1e-5)
@@ -289,18 +318,20 @@ def test_geometry_tells_render_net_where_it_draws(
     plain = small(variant=variant, clearance=clearance)
     feature_map = model.encode(photo, iuv)
     assert feature_map.shape[1] == model.config.map_channels
-    feature_map[:, :-3] = torch.rand(1, plain.config.map_channels, 64, 64)
+    at = model.config.warped_channels
+    feature_map[:, :at] = torch.rand(1, at, 64, 64)
+    without = torch.cat([feature_map[:, :at], feature_map[:, at + 3 :]], dim=1)
     image = model.feature_image(feature_map, targets)
     assert image.shape == (3, model.config.render_inputs, 32, 32)
     known = plain.config.render_inputs
-    assert torch.equal(image[:, :known], plain.feature_image(feature_map[:, :-3], targets))
+    assert torch.equal(image[:, :known], plain.feature_image(without, targets))
     body, around = targets[:, :1] > 0, image[:, known:]
     assert torch.equal(around[:, -1:], signed_distance(body, OUTLINE_PIXELS) / UNIT_PIXELS)
-    places = sample_features(feature_map[:, -3:], targets, model.charts)
+    places = sample_features(feature_map[:, at : at + 3], targets, model.charts)
     assert torch.allclose(around[:, -4:-1], spread_colours(places, body, MARGIN_LEVELS))
     assert around.shape[1] == 4 + clearance
     if clearance:
-        own = image[:, plain.config.feature_outputs, None]
+        own = image[:, plain.config.appearance_channels, None]
         assert torch.equal(around[:, :1], spread_colours(own, body, MARGIN_LEVELS))
 
 
@@ -452,8 +483,9 @@ def test_state_dict_round_trip(
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_state_dict_holds_networks_only(variant: str) -> None:
     model = small(variant=variant)
-    networks = {key.split(".")[0] for key in model.state_dict()}
-    assert networks == ({"feature_net"} if model.feature_net else set()) | {"render_net"}
+    expected = {"render_net"} | ({"feature_net"} if model.feature_net else set())
+    expected |= {"photo_net"} if variant == "texture-features" else set()
+    assert {key.split(".")[0] for key in model.state_dict()} == expected
     assert "charts" in dict(model.named_buffers())
 
 
@@ -545,3 +577,114 @@ def test_onnx_export_of_render_equals_torch(targets: Tensor, variant: str, tmp_p
     with torch.no_grad():
         expected = model.render(feature_map, other)
     torch.testing.assert_close(torch.from_numpy(frames), expected, rtol=0, atol=1e-4)
+
+
+def of_ones(module: nn.Module | None) -> None:
+    """Have a network write ones, whatever it reads."""
+    assert isinstance(module, nn.Module) and isinstance(module.exit, nn.Conv2d)
+    nn.init.zeros_(module.exit.weight)
+    assert module.exit.bias is not None
+    nn.init.ones_(module.exit.bias)
+
+
+@pytest.mark.parametrize("variant", ["texture-features", "cbi", "dpt"])
+def test_a_variant_that_reads_the_photo_asks_for_it(
+    photo: Tensor, iuv: Tensor, variant: str
+) -> None:
+    model = small(variant=variant)
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    with pytest.raises(ShapeError, match=f"variant {variant} reads the source's picture; give it"):
+        model.encode_texture(texture, visibility)
+    given = model.encode_texture(texture, visibility, pictures=pictures(photo, iuv))
+    assert torch.allclose(given, model.encode(photo, iuv))
+
+
+def test_texels_carry_features_where_they_are_seen(photo: Tensor, iuv: Tensor) -> None:
+    model = small(variant="texture-features")
+    of_ones(model.photo_net)
+    assert model.feature_net is not None
+    read: list[Tensor] = []
+    model.feature_net.register_forward_pre_hook(lambda _, given: read.append(given[0]))
+    model.encode(photo, iuv)
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    features, known = read[0][:, 3:11], read[0][:, 11:]
+    assert torch.equal(read[0][:, :3], texture) and torch.equal(known, visibility)
+    assert torch.allclose(features, visibility.expand(-1, PHOTO_FEATURES, -1, -1))
+
+
+def test_features_are_means_of_the_pictures_that_see_a_texel(photo: Tensor, iuv: Tensor) -> None:
+    model = small(variant="texture-features")
+    half = iuv.clone()
+    half[:, :, :16] = 0
+    texture, _ = extract_texture(photo, iuv, model.charts, 64)
+    one = pictures(photo, iuv)
+    other = pictures(-photo, half)
+    together = model._features_like(texture, torch.cat([one, other], dim=1))
+    alone = [model._features_like(texture, each) for each in (one, other)]
+    assert together is not None and alone[0] is not None and alone[1] is not None
+    seen = extract_texture(photo, half, model.charts, 64)[1] > 0
+    mean = (alone[0] + alone[1]) / 2
+    assert seen.any() and not seen.all()
+    assert torch.allclose(together, torch.where(seen, mean, alone[0]), atol=1e-5)
+
+
+def test_features_see_what_lies_around_the_body(photo: Tensor, iuv: Tensor) -> None:
+    model = small(variant="texture-features")
+    beside = photo.clone()
+    beside[(iuv[:, :1] == 0).expand_as(photo)] *= -1  # the body's own pixels stay as they are
+    texture, other = (extract_texture(p, iuv, model.charts, 64)[0] for p in (photo, beside))
+    assert torch.equal(texture, other)
+    seen = [model._features_like(texture, pictures(p, iuv)) for p in (photo, beside)]
+    assert seen[0] is not None and seen[1] is not None
+    assert not torch.allclose(*seen, rtol=1e-2)
+
+
+def test_hidden_texels_have_the_colour_of_the_place_that_they_are_taken_from(
+    photo: Tensor, iuv: Tensor
+) -> None:
+    model = small(variant="cbi")
+    of_ones(model.feature_net)  # every texel is taken from the corner, x = y = 1
+    feature_map = model.encode(photo, iuv)
+    texture, visibility = extract_texture(photo, iuv, model.charts, 64)
+    corner = ((photo[:, :, -1, -1] + 1) * 127.5).round() / 127.5 - 1
+    hidden = (visibility == 0).expand_as(texture)
+    assert torch.allclose(
+        feature_map[:, :3][hidden], corner[0, :, None, None].expand(3, 64, 64)[hidden[0]]
+    )
+    assert torch.equal(feature_map[:, :3][~hidden], texture[~hidden]), "what is seen stays"
+    assert torch.equal(feature_map[:, 3:], torch.ones(1, 2, 64, 64))
+
+
+def test_coordinates_lead_back_to_the_photo(photo: Tensor, iuv: Tensor) -> None:
+    """With the shortcut and a network that adds nothing, texels that are seen see themselves."""
+    model = small(variant="cbi", colour_shortcut=True)
+    of_ones(model.feature_net)
+    assert model.feature_net is not None and model.feature_net.exit.bias is not None
+    nn.init.zeros_(model.feature_net.exit.bias)
+    feature_map = model.encode(photo, iuv)
+    places, seen = extract_texture(pixel_places(photo), iuv, model.charts, 64)
+    assert torch.equal(feature_map[:, 3:], places)
+    found = F.grid_sample(photo, places.permute(0, 2, 3, 1), align_corners=False)
+    colours = extract_texture(photo, iuv, model.charts, 64)[0]
+    # a texel is a mean of pixels, and the photo at the mean of their places
+    assert (found - colours)[seen.expand_as(colours) > 0].abs().median() < 0.1
+
+
+def test_the_direct_network_sees_no_warped_colours(
+    photo: Tensor, iuv: Tensor, targets: Tensor
+) -> None:
+    model = small(variant="dpt", alpha=True)
+    assert isinstance(model.render_net, DirectAndBlending)
+    drawn: list[Tensor] = []
+    model.render_net.direct.register_forward_hook(lambda _, __, given: drawn.append(given))
+    feature_map = model.encode(photo, iuv)
+    other = feature_map.clone()
+    other[:, :3] *= -1
+    frames = [model.render(each, targets) for each in (feature_map, other)]
+    assert torch.equal(*drawn) and drawn[0].shape == (3, 3, 32, 32)
+    assert not torch.allclose(*frames)
+    levels = (pictures(photo, iuv)[0, 0, :3].float() / 127.5 - 1)[None]
+    image = model.feature_image(feature_map, targets)
+    assert torch.equal(image[:1, 6:9], levels), "the photo itself, pixel for pixel"
+    assert torch.equal(image[:1, 9:], normalise_iuv(iuv))
+    assert torch.equal(image[:, 3:6], normalise_iuv(targets))

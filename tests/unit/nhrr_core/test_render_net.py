@@ -8,26 +8,21 @@ from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
 from nhrr_core import ModelConfig, RenderNet
+from nhrr_core.config import RenderSizes
 from nhrr_core.render_net import ResidualBlock, UpConvolution, even_kernel
 
 
 def small(**changes: Any) -> RenderNet:
     sizes = {"inputs": 5, "outputs": 3, "width": 4, "down_blocks": 2, "residual_blocks": 2}
-    return RenderNet(**{**sizes, **changes}).eval()
+    sizes |= {"shortcut": False, "even": False}
+    return RenderNet(RenderSizes(**{**sizes, **changes})).eval()
 
 
 def preset(name: str) -> RenderNet:
     """The preset's network, without storage."""
     config = ModelConfig.preset(name)
     with torch.device("meta"):
-        return RenderNet(
-            inputs=config.render_inputs,
-            outputs=config.render_outputs,
-            width=config.render_width,
-            down_blocks=config.down_blocks,
-            residual_blocks=config.residual_blocks,
-            shortcut=config.geometry,
-        )
+        return RenderNet(config.render_sizes)
 
 
 @pytest.mark.parametrize(("name", "millions"), [("paper", 31.5), ("lite", 7.9)])

@@ -10,13 +10,12 @@ import pytest
 import torch
 
 from motion_transfer.drawing.person import find_people
-from motion_transfer.drawing.window import Window, plan_window
+from motion_transfer.drawing.window import Window, cut_picture, plan_window
 from motion_transfer.errors import InputError
 from motion_transfer.training.config import build_config
 from motion_transfer.training.pairs import open_pairs
 from motion_transfer.training.samples import (
     TrainingSamples,
-    cut_picture,
     number_batches,
     person_window,
 )
