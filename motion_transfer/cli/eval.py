@@ -12,15 +12,28 @@ from motion_transfer.cli.options import FILE, WordsCommand, described_options, s
 from motion_transfer.cli.people import prepare_body_model
 from motion_transfer.cli.progress import CountBar
 from motion_transfer.cli.terminal import note
-from motion_transfer.evaluation.options import OUTPUT, EvaluationOptions
+from motion_transfer.evaluation.options import (
+    DEEPFASHION,
+    FREE_PEOPLE,
+    OUTPUT,
+    PAIRS,
+    PEOPLE,
+    EvaluationOptions,
+)
 from motion_transfer.option import options_from_words
 
+pairs_option = section(PAIRS)
 output_option = section(OUTPUT)
 compare_option = section("Earlier results")
 
 
 @click.command("eval", cls=WordsCommand)
 @described_options(EvaluationOptions, required=False)
+@pairs_option(
+    "--list-pairs",
+    is_flag=True,
+    help="Only print the pairs of deepfashion as such a CSV; needs no IUV yet.",
+)
 @output_option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 @output_option("--json", "as_json", is_flag=True, help="Print results.json, not the table.")
 @compare_option(
@@ -30,7 +43,9 @@ compare_option = section("Earlier results")
     metavar="FILE...",
     help="Only print a table of earlier results; refused where protocols differ.",
 )
-def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -> None:
+def eval_(
+    compare: tuple[Path, ...], list_pairs: bool, quiet: bool, as_json: bool, **words: Any
+) -> None:
     """Score renderers, and other methods' pictures, on the same pairs.
 
     Every source is rendered in its target's pose and compared with the real target: SSIM, PSNR,
@@ -41,10 +56,12 @@ def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -
     \b
     mt eval --pairs pairs.csv --renderer texture -o draft/
     mt eval --pairs pairs.csv --images photos/ --weights a.safetensors b.safetensors \\
-            --results CBI/ DSC/ -o table1/
+            --results CBI/ DSC/ -o photos_scores/
     mt eval --clips fashion/ --weights a.safetensors -o videos/
     mt eval --protocol people --weights a.safetensors --renderer texture -o people/
     mt eval --protocol free-people --assets makehuman/ --weights a.safetensors -o free/
+    mt eval --protocol deepfashion --images In-shop/ --weights a.safetensors \\
+            --lpips-weights alexnet.pth --results DSC/ -o table1/
     mt eval --compare table1/results.json later/results.json
     """
     if compare:
@@ -52,13 +69,22 @@ def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -
 
         click.echo(compare_results(compare))
         return
+    if list_pairs:
+        if words["protocol"] != DEEPFASHION or words["images"] is None:
+            raise click.UsageError(f"--list-pairs needs --protocol {DEEPFASHION} and --images DIR")
+        from motion_transfer.evaluation.deepfashion import list_table1_pairs
+
+        folder, listed = Path(words["images"]), words["pairs"]
+        text = list_table1_pairs(folder, Path(listed) if listed else None, words["limit"])
+        click.echo(text, nl=False)
+        return
     if words["output"] is None:
         raise click.UsageError("Missing option '-o' / '--output'.")
     options = options_from_words(EvaluationOptions, words)
     from motion_transfer.evaluation.evaluate import evaluate
-    from motion_transfer.evaluation.report import table
+    from motion_transfer.evaluation.report import table, table_beside
 
-    if options.protocol is not None:
+    if options.protocol in (PEOPLE, FREE_PEOPLE):
         prepare_body_model(quiet, options.protocol_assets)
     with (
         CountBar("looking at the pairs", unit="picture", quiet=quiet) as pictures,
@@ -77,6 +103,14 @@ def eval_(compare: tuple[Path, ...], quiet: bool, as_json: bool, **words: Any) -
         click.echo(table(results.columns, results.methods, protocol.pairs_count))
         click.echo(
             f"{protocol.pairs_count} pairs of {protocol.pairs_name} at {protocol.resolution};"
-            " mean ± standard error, * best\n"
-            f"wrote {options.output}: results.json, scores.csv, sheet.png"
+            " mean ± standard error, * best"
         )
+        if results.published is not None:
+            beside = table_beside(
+                results.published, results.columns, results.methods, protocol.pairs_count
+            )
+            click.echo(
+                f"\n{beside}\n{results.published.remark}\n"
+                "what the paper leaves open, and what holds here: protocol.choices in results.json"
+            )
+        click.echo(f"wrote {options.output}: results.json, scores.csv, sheet.png")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path, PurePosixPath
@@ -16,6 +17,7 @@ from motion_transfer.drawing.source import Source, SourcePicture, unfold_source
 from motion_transfer.drawing.window import plan_window
 from motion_transfer.errors import InputError
 from motion_transfer.evaluation.framing import Framing, Image
+from motion_transfer.evaluation.in_shop import spell_names
 from motion_transfer.evaluation.options import EvaluationOptions
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES
 from motion_transfer.media.pictures.photo import read_photo
@@ -23,18 +25,25 @@ from motion_transfer.training.pairs import Pair, flat_stem
 from motion_transfer.training.pictures import PersonPicture
 from motion_transfer.weights import find_weights
 
-PATTERNS = (
-    "SOURCE__TARGET",
-    "SOURCE___TARGET",
-    "SOURCE___TARGET_vis",
-    "SOURCE_2_TARGET",
-    "SOURCE_2_TARGET_vis",
-    "SOURCE.jpg___TARGET.jpg",
-    "SOURCE.jpg___TARGET.jpg_vis",
-)
+PATTERNS = {
+    "SOURCE__TARGET": 1,
+    "SOURCE___TARGET": 1,
+    "SOURCE___TARGET_vis": 5,
+    "SOURCE_2_TARGET": 1,
+    "SOURCE_2_TARGET_vis": 1,
+    "SOURCE.jpg_TARGET.jpg": 3,
+    "SOURCE.jpg___TARGET.jpg": 1,
+    "SOURCE.jpg___TARGET.jpg_vis": 5,
+}
 """How results are named, without their ending: as this program does, then as the published code of
-Siarohin et al., Zhu et al. (PATN) and Ren et al. (GFLA). Where a name held folders, `-` joins them;
-the last two keep the ending of each picture in the pair list."""
+Zhu et al. (PATN, `___`), Ren et al. (GFLA, `_2_`) and Siarohin et al. (DSC, `.jpg_`) does. Where a
+name held folders, `-` joins them; `.jpg` keeps the ending of each picture in the pair list.
+DeepFashion's photos may be spelled in all the ways that `spell_names` knows.
+
+And how many pictures stand side by side in a file, the result last: DSC's `test.py` joins source,
+target and result, PATN's visuals are source, pose, target, pose and result. What is no such strip
+is taken whole. The code of Esser et al. (VUnet) names no pairs: its `transfer_0.png` tiles a
+shuffled batch, each person in the poses of all; pictures cut out of it have to be named."""
 
 Draw = Callable[[Pair, PersonPicture], Image]
 """Draws one source in a target's pose, as large as the target or of its aspect."""
@@ -128,7 +137,7 @@ class ResultsFolder:
             raise InputError(f"results {path} is not a folder")
         self.path, self.label = path, path.name
         self._files = {
-            file.name.removesuffix(file.suffix): file
+            spell_names(file.name.removesuffix(file.suffix)): file
             for file in sorted(path.iterdir())
             if file.suffix.lower() in PHOTO_SUFFIXES
         }
@@ -150,16 +159,21 @@ class ResultsFolder:
         if name not in self._files:
             return f"{self.path}/{name}.png does not exist"
         try:
-            size = self.read(pair).shape[1::-1]
-            target = pair.target.load().rgb.shape[1::-1]
-            framing.check_aspect(size, target, f"result {self._files[name]}")
+            target = pair.target.load()
+            size = self.read(pair, target).shape[1::-1]
+            framing.check_aspect(size, target.rgb.shape[1::-1], f"result {self._files[name]}")
         except InputError as error:
             return str(error)
         return None
 
-    def read(self, pair: Pair) -> Image:
-        """Read the picture of a pair. Raises: InputError."""
-        return read_photo(self._files[_name_result(self.pattern, pair)], "result").rgb
+    def read(self, pair: Pair, target: PersonPicture) -> Image:
+        """Read the picture of a pair, the last one where it is a strip. Raises: InputError."""
+        picture = read_photo(self._files[_name_result(self.pattern, pair)], "result").rgb
+        count = PATTERNS[self.pattern]
+        (height, width), (target_height, target_width) = picture.shape[:2], target.rgb.shape[:2]
+        # half-way, in ratios: a method may crop the target to 176 of 256 px, or pad it from there
+        is_strip = width * target_height > math.sqrt(count) * height * target_width
+        return picture[:, -(width // count) :] if count > 1 and is_strip else picture
 
     def describe(self) -> dict[str, Any]:
         return {
@@ -170,7 +184,7 @@ class ResultsFolder:
         }
 
     def open_source(self, _source: OpenedSource) -> Draw:
-        return lambda pair, _target: self.read(pair)
+        return self.read
 
 
 class TargetCandidate:
@@ -231,4 +245,4 @@ def _name_result(pattern: str, pair: Pair) -> str:
         words[word] = flat_stem(picture.name)
         words[f"{word}.jpg"] = PurePosixPath(picture.name).name
     # at once, as a source may itself be called TARGET
-    return re.sub(r"(SOURCE|TARGET)(\.jpg)?", lambda found: words[found[0]], pattern)
+    return spell_names(re.sub(r"(SOURCE|TARGET)(\.jpg)?", lambda found: words[found[0]], pattern))

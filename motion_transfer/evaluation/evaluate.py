@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,15 @@ import torch
 
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.evaluation.candidates import ResultsFolder, open_candidates
+from motion_transfer.evaluation.deepfashion import TABLE_1, open_table1_pairs
 from motion_transfer.evaluation.framing import Image, PairPictures
-from motion_transfer.evaluation.measures import Column, choose_measures
-from motion_transfer.evaluation.options import EvaluationOptions
+from motion_transfer.evaluation.measures import Column, Measures, choose_measures
+from motion_transfer.evaluation.options import (
+    DEEPFASHION,
+    FREE_PEOPLE,
+    PEOPLE,
+    EvaluationOptions,
+)
 from motion_transfer.evaluation.report import (
     RESULTS_FILE,
     Protocol,
@@ -74,9 +80,12 @@ def evaluate(
         weights={"lpips": options.lpips_weights, "fid": options.fid_weights},
         has_clips=options.clips is not None,
     )
-    pairs = open_pairs_of(options, checked)
+    published = TABLE_1 if options.protocol == DEEPFASHION else None
+    pairs, choices = open_pairs_of(options, checked)
     for line in pairs.dropped:
         notice(f"left out: {line}")
+    if published is not None:
+        _note_departures(options, measures, notice)
     folders = [ResultsFolder(path, pairs) for path in options.results]
     pairs = _check_results(folders, pairs, options, notice)
     candidates = open_candidates(options, folders)
@@ -88,9 +97,9 @@ def evaluate(
             candidates, measures, options.framing, workers=options.worker_count, save=save
         ) as scorer:
             scored = scorer.score(pairs, lambda count: done(count, len(pairs)))
-            protocol = Protocol.of(options.framing, pairs, measures)
+            protocol = Protocol.of(options.framing, pairs, measures, choices)
             methods = summarise_methods(candidates, measures, scored)
-            results = Results(protocol, measures.columns, methods)
+            results = Results(protocol, measures.columns, methods, published)
             _write_sheet(finished / SHEET_FILE, scorer, results, scored)
         (finished / RESULTS_FILE).write_text(results.to_json(_made_with()))
         columns = [column for measure in measures.pairs for column in measure.columns]
@@ -117,20 +126,41 @@ def check_output(path: Path, *, force: bool) -> None:
         )
 
 
-def open_pairs_of(options: EvaluationOptions, checked: Done) -> PairList:
-    """Open the pairs that the options name, each looked at. Raises: InputError listing problems."""
-    if options.protocol is not None:
-        return held_out_pairs(options.limit or HELD_OUT_PAIRS, options.protocol_assets)
+def open_pairs_of(options: EvaluationOptions, checked: Done) -> tuple[PairList, Mapping[str, str]]:
+    """Open the pairs that the options name, each looked at; tell what their protocol left open.
+
+    Raises: InputError listing problems.
+    """
+    if options.protocol in (PEOPLE, FREE_PEOPLE):
+        return held_out_pairs(options.limit or HELD_OUT_PAIRS, options.protocol_assets), {}
     common: dict[str, Any] = {
         "iuv_order": options.iuv_order,
         "limit": options.limit,
         "skip_broken": options.skip_broken,
         "done": checked,
     }
+    if options.protocol == DEEPFASHION:
+        assert options.images is not None
+        return open_table1_pairs(options.images, options.pairs, **common)
     if options.clips is not None:
-        return open_clip_pairs(options.clips, moments=options.moments, **common)
+        return open_clip_pairs(options.clips, moments=options.moments, **common), {}
     assert options.pairs is not None
-    return open_pairs(options.pairs, options.images, **common)
+    return open_pairs(options.pairs, options.images, **common), {}
+
+
+def _note_departures(
+    options: EvaluationOptions, measures: Measures, notice: Callable[[str], None]
+) -> None:
+    """Tell where this run plainly is not the paper's; results files tell the rest."""
+    if options.pairs is None:
+        notice(
+            "the paper's 176 pairs are not published: these are drawn from the folder; give others"
+            " with --pairs"
+        )
+    for name in TABLE_1.better.keys() - {column.name for column in measures.columns}:
+        lacks_weights = name == "lpips" and options.lpips_weights is None
+        reason = "it needs --lpips-weights FILE" if lacks_weights else "--metrics leaves it out"
+        notice(f"{name}, which the paper's table has, is not measured: {reason}")
 
 
 def _check_results(

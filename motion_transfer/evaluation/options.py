@@ -16,7 +16,7 @@ from motion_transfer.option import REQUIRED, check_choices, option, parse_size
 if TYPE_CHECKING:
     from motion_transfer.evaluation.framing import Framing
 
-FREE_PEOPLE = "free-people"
+PEOPLE, FREE_PEOPLE, DEEPFASHION = "people", "free-people", "deepfashion"
 PAIRS = "Pairs (one of --pairs, --clips and --protocol)"
 METHODS = "Methods to compare (any number, of any kind)"
 PROTOCOL = "Protocol (numbers are comparable only where it is the same)"
@@ -37,7 +37,10 @@ class EvaluationOptions:
         kind="path",
     )
     images: Path | None = option(
-        "--images", PAIRS, "Folder that the names are relative to; else the CSV's.", kind="path"
+        "--images",
+        PAIRS,
+        "Folder that the names are relative to, else the CSV's; for deepfashion, In-shop's.",
+        kind="path",
     )
     clips: Path | None = option(
         "--clips",
@@ -48,10 +51,11 @@ class EvaluationOptions:
     protocol: str | None = option(
         "--protocol",
         PAIRS,
-        "A built-in set: synthetic people on whom nothing is ever trained, painted ones or those"
-        " in photographed clothes; 500 unless --limit.",
-        choices=("people", FREE_PEOPLE),
-        metavar="[people|free-people]",
+        "A named set: people (synthetic and painted, nothing is ever trained on them) or"
+        " free-people (in photographed clothes), 500 pairs; deepfashion, the paper's Table 1 on"
+        " the In-shop photos in --images, 176 pairs or those of --pairs. Fewer with --limit.",
+        choices=(PEOPLE, FREE_PEOPLE, DEEPFASHION),
+        metavar="NAME",
     )
     assets: Path | None = option(
         "--assets",
@@ -105,7 +109,8 @@ class EvaluationOptions:
     results: tuple[Path, ...] = option(
         "--results",
         METHODS,
-        "Pictures that another method made, named SOURCE__TARGET.png or from.jpg___to.jpg.",
+        "Pictures that another method made, named SOURCE__TARGET.png or from.jpg___to.jpg, or as"
+        " published code names them.",
         kind="paths",
         default=(),
         metavar="FOLDER...",
@@ -163,8 +168,15 @@ class EvaluationOptions:
 
     def __post_init__(self) -> None:
         check_choices(self)
-        if sum(given is not None for given in (self.pairs, self.clips, self.protocol)) != 1:
+        # deepfashion alone has a use for a list: of its own pairs
+        pairs = self.pairs if self.protocol != DEEPFASHION else None
+        if sum(given is not None for given in (pairs, self.clips, self.protocol)) != 1:
             raise InputError("give one of --pairs, --clips and --protocol")
+        if self.protocol == DEEPFASHION and self.images is None:
+            raise InputError(
+                f"protocol {DEEPFASHION} needs the photos; name the benchmark's folder with"
+                " --images DIR"
+            )
         if self.renderer is not None and (
             self.renderer not in RENDERERS or RENDERERS[self.renderer].default_weights is not None
         ):

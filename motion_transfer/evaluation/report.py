@@ -39,6 +39,7 @@ class Protocol:
         pairs_count, pairs_sha256: Of what was scored: names, order and pixels.
         metrics: Each number's definition, with the SHA-256 of the weights behind it.
         packages: MAJOR.MINOR of the libraries that resize pictures and compute numbers.
+        choices: What the protocol that was followed leaves open, and what was done about it.
     """
 
     resolution: str
@@ -51,6 +52,7 @@ class Protocol:
     pairs_sha256: str
     metrics: Mapping[str, str]
     packages: Mapping[str, str]
+    choices: Mapping[str, str] = field(default_factory=dict)
 
     def differences(self, other: Protocol) -> list[str]:
         """List why numbers of the two may not be compared, a line for each; none if they may.
@@ -71,7 +73,13 @@ class Protocol:
         return lines
 
     @classmethod
-    def of(cls, framing: Framing, pairs: PairList, measures: Measures) -> Protocol:
+    def of(
+        cls,
+        framing: Framing,
+        pairs: PairList,
+        measures: Measures,
+        choices: Mapping[str, str],
+    ) -> Protocol:
         """Tell how these measures find the numbers of these pairs."""
         return cls(
             resolution=f"{framing.width}x{framing.height}",
@@ -84,16 +92,20 @@ class Protocol:
             pairs_sha256=pairs.digest,
             metrics={column.name: column.definition for column in measures.columns},
             packages=package_versions(measures.packages),
+            choices=choices,
         )
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Protocol:
         """Invert `asdict`. Raises: InputError if fields are missing or unknown."""
+        values = {"choices": {}, **values}  # files from before there were any have none
         wrong = sorted({item.name for item in fields(cls)} ^ set(values))
         if wrong:
             raise InputError(f"the protocol lacks, or should not have, {', '.join(wrong)}")
-        if not all(isinstance(values[name], Mapping) for name in ("metrics", "packages")):
-            raise InputError("the protocol's metrics and packages are not tables")
+        if not all(
+            isinstance(values[name], Mapping) for name in ("metrics", "packages", "choices")
+        ):
+            raise InputError("the protocol's metrics, packages and choices are not all tables")
         return cls(**values)
 
 
@@ -172,12 +184,30 @@ def summarise_methods(
 
 
 @dataclass(frozen=True)
+class Published:
+    """Numbers that a paper printed. They are shown, and never taken for measured ones.
+
+    Attributes:
+        source: Where they stand.
+        remark: How they came about.
+        better: For each number, which end is good, `higher` or `lower`.
+        scores: For each method its numbers.
+    """
+
+    source: str
+    remark: str
+    better: Mapping[str, str]
+    scores: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
 class Results:
-    """What a results file holds."""
+    """What a results file holds; what was published is written into it, but not read from it."""
 
     protocol: Protocol
     columns: tuple[Column, ...]
     methods: tuple[Method, ...]
+    published: Published | None = None
 
     def to_json(self, made_with: Mapping[str, str]) -> str:
         """Write the file's text. Numbers that JSON lacks are null (NaN) and "inf"."""
@@ -198,13 +228,15 @@ class Results:
             }
             for method in self.methods
         ]
-        content = {
+        content: dict[str, Any] = {
             "format": FORMAT,
             "made_with": dict(made_with),
             "protocol": asdict(self.protocol),
             "columns": [asdict(column) for column in self.columns],
             "methods": methods,
         }
+        if self.published is not None:
+            content["published"] = asdict(self.published)
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
@@ -269,6 +301,28 @@ def table(columns: Sequence[Column], methods: Sequence[Method], pairs_count: int
     """
     rows = [["", *(method.label for method in methods)]]
     rows += [[_head(column, methods, pairs_count), *_cells(column, methods)] for column in columns]
+    return _align(rows)
+
+
+def table_beside(
+    published: Published, columns: Sequence[Column], methods: Sequence[Method], pairs_count: int
+) -> str:
+    """Draw the published numbers right of a bar, and left of it the measured ones of their kinds.
+
+    A number that was not measured has its row all the same.
+    """
+    measured = {column.name: column for column in columns}
+    rows = [["", *(method.label for method in methods), "|", *published.scores]]
+    for name, better in published.better.items():
+        if name in measured:
+            row = [_head(measured[name], methods, pairs_count), *_cells(measured[name], methods)]
+        else:
+            row = [f"{name} {ARROWS[better]}", *("- " for _ in methods)]
+        rows.append([*row, "|", *(f"{each[name]:.3f}" for each in published.scores.values())])
+    return f"measured here | published: {published.source}\n{_align(rows)}"
+
+
+def _align(rows: Sequence[Sequence[str]]) -> str:
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(

@@ -37,6 +37,7 @@ NAMES: dict[str, Callable[[str, str], str]] = {
     "SOURCE___TARGET_vis": lambda a, b: f"{a}___{b}_vis.PNG",
     "SOURCE_2_TARGET": lambda a, b: f"{a}_2_{b}.png",
     "SOURCE_2_TARGET_vis": lambda a, b: f"{a}_2_{b}_vis.png",
+    "SOURCE.jpg_TARGET.jpg": lambda a, b: f"{a}.png_{b}.png.png",
     "SOURCE.jpg___TARGET.jpg": lambda a, b: f"{a}.png___{b}.png.webp",
     "SOURCE.jpg___TARGET.jpg_vis": lambda a, b: f"{a}.png___{b}.png_vis.jpg",
 }
@@ -61,7 +62,25 @@ def test_each_naming_is_recognised(studio, pairs: PairList, pattern: str) -> Non
     assert folder.pattern == pattern
     for index, pair in enumerate(pairs):
         assert folder.find_problem(pair, Framing()) is None
-        assert abs(int(folder.read(pair)[9, 9, 0]) - 50 * (index + 1)) <= 2
+        drawn = folder.read(pair, pair.target.load())
+        assert abs(int(drawn[9, 9, 0]) - 50 * (index + 1)) <= 2
+
+
+STRIPS = {name: count for name, count in PATTERNS.items() if count > 1}
+
+
+@pytest.mark.parametrize("pattern", STRIPS)
+@pytest.mark.parametrize("width", [42, 64, 96])  # cropped, as the target, and square
+def test_the_last_picture_of_a_strip_counts(studio, pairs: PairList, pattern: str, width) -> None:
+    pair, others = pairs[0], width * (STRIPS[pattern] - 1)
+    result = np.full((96, width, 3), 200, np.uint8)
+    strip = np.hstack([np.zeros((96, others, 3), np.uint8), result])
+    for name, pixels in (("strip", strip), ("alone", result)):
+        stem = Path(NAMES[pattern]("a", "b")).stem
+        studio.image(f"{name}/{stem}.png", pixels)
+        folder = ResultsFolder(studio.folder / name, pairs)
+        assert folder.pattern == pattern
+        np.testing.assert_array_equal(folder.read(pair, pair.target.load()), result)
 
 
 def test_the_naming_that_finds_most_wins(studio, pairs: PairList) -> None:

@@ -15,6 +15,7 @@ from motion_transfer.evaluation.measures import Column
 from motion_transfer.evaluation.report import (
     Method,
     Protocol,
+    Published,
     Results,
     Summary,
     compare,
@@ -23,6 +24,7 @@ from motion_transfer.evaluation.report import (
     scores_csv,
     summarise,
     table,
+    table_beside,
 )
 from motion_transfer.evaluation.scoring import PairScores
 from motion_transfer.training.pairs import Pair
@@ -40,6 +42,7 @@ PROTOCOL = Protocol(
     pairs_sha256="ab",
     metrics={column.name: column.definition for column in COLUMNS},
     packages={"torch": "2.13"},
+    choices={"pairs": "drawn"},
 )
 CHANGES = {
     "resolution": "512x512",
@@ -51,6 +54,7 @@ CHANGES = {
     "pairs_sha256": "cd34",
     "metrics": {"ssim": "another SSIM", "l1": "l1"},
     "packages": {"torch": "2.14"},
+    "choices": {"pairs": "listed"},
 }
 
 
@@ -102,8 +106,13 @@ def test_what_is_no_protocol() -> None:
     values = asdict(PROTOCOL)
     with pytest.raises(InputError, match="lacks, or should not have, mask, masks"):
         Protocol.from_dict({**{k: v for k, v in values.items() if k != "mask"}, "masks": ""})
-    with pytest.raises(InputError, match="are not tables"):
+    with pytest.raises(InputError, match="are not all tables"):
         Protocol.from_dict({**values, "metrics": "ssim"})
+
+
+def test_a_file_from_before_there_were_choices_is_read() -> None:
+    values = {name: value for name, value in asdict(PROTOCOL).items() if name != "choices"}
+    assert Protocol.from_dict(values) == replace(PROTOCOL, choices={})
 
 
 def test_package_versions_leave_patches_out() -> None:
@@ -268,3 +277,27 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     other.write_text(json.dumps(content))
     with pytest.raises(InputError, match="lacks, or should not have, mask"):
         compare([path, other])
+
+
+# --- what a paper printed stands beside what was measured, and apart from it
+
+PUBLISHED = Published(
+    "A Table", "ten pairs", {"ssim": "higher", "lpips": "lower"}, {"X": {"ssim": 0.9, "lpips": 0.1}}
+)
+
+
+def test_published_numbers_have_a_side_of_their_own() -> None:
+    head, labels, ssim, lpips = table_beside(PUBLISHED, COLUMNS, RESULTS.methods, 9).splitlines()
+    assert head == "measured here | published: A Table"
+    assert labels.split() == ["a", "b", "|", "X"]
+    # the best of those measured: the published one is no rival
+    assert ssim.split() == ["ssim", "↑", "0.700", "±0.010", "0.800", "±0.010*", "|", "0.900"]
+    assert lpips.split() == ["lpips", "↓", "-", "-", "|", "0.100"]
+    assert labels.index("|") == ssim.index("|") == lpips.index("|")
+
+
+def test_they_are_in_the_file_and_never_among_its_methods(tmp_path) -> None:
+    path = write(tmp_path, "one.json", replace(RESULTS, published=PUBLISHED))
+    assert json.loads(path.read_text())["published"] == asdict(PUBLISHED)
+    assert read_results(path) == RESULTS
+    assert "0.9" not in compare([path, path])
