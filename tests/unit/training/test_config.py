@@ -114,7 +114,11 @@ def test_bad_assignments(text: str) -> None:
         ("losses.texture_weight", float("nan"), "a finite number"),
         ("speed.precision", "fp16", "'auto', 'fp32' or 'bf16'"),
         ("data.views", 1, "greater than or equal to 2"),
-        ("model.variant", "wrap", "'full', 'no-int', 'ip', 'warp' or 'warp-cond'"),
+        (
+            "model.variant",
+            "wrap",
+            "'full', 'no-int', 'ip', 'warp', 'warp-cond', 'texture-features', 'cbi' or 'dpt'",
+        ),
         ("model.image_size", 60, r"\[model\]: image_size is 60"),
         ("data.background", "pinkish", "background"),
     ],

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,8 @@ def person(number: int) -> PaintedPerson:
     iuv[:, 0, 8:24, 8:24] = 2
     iuv[:, 1:, 8:24, 8:24] = np.mgrid[60:220:10, 60:220:10]
     clearance = np.ones((VIEWS, 2, 128, 128), np.float16)
-    return PaintedPerson(image, iuv, clearance, image, iuv, image[:, :1])
+    picture = np.concatenate([image, iuv], axis=1)
+    return PaintedPerson(image, iuv, clearance, image, iuv, image[:, :1], picture)
 
 
 class Paint:
@@ -151,6 +153,21 @@ def test_a_painter_trims_and_cuts_as_everybody_does(body_model) -> None:
     crop = cut_target(picture, 64, config.data, np.random.default_rng((0, 1, 1)))
     assert (painted.image[0] == crop.rgb.transpose(2, 0, 1)).all()
     assert unfold_picture(SourcePicture(picture.as_photo(), picture.iuv), 64)[1].any()
+
+
+def test_networks_that_read_the_photo_get_that_of_the_source(config: TrainConfig) -> None:
+    reading = replace(config, model=replace(config.model, variant="cbi"))
+    batch = next(open_pool(reading, Paint()))
+    shown = batch["source_pictures"]
+    assert (shown.dtype, shown.shape) == (torch.uint8, (16, 1, 6, 32, 32))
+    people, targets = who(batch["target_image"])
+    assert shown[:, 0, 0, 8, 8].tolist() == people
+    views = shown[:, 0, 1, 8, 8].tolist()
+    assert all(view != target for view, target in zip(views, targets, strict=True))
+    assert not any(name == "source_pictures" for name in next(open_pool(config, Paint())))
+    half = halve(batch)["source_pictures"]
+    assert torch.equal(half[:, :, :3], shown[:, :, :3, ::2, ::2]), "of one colour"
+    assert torch.equal(half[:, :, 3:], shown[:, :, 3:, 1::2, 1::2])
 
 
 def test_halved_textures_and_images_are_means(config: TrainConfig) -> None:

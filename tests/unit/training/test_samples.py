@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import torch
 
+from motion_transfer.drawing.engines.torch_engine import cut_pictures
 from motion_transfer.drawing.person import find_people
+from motion_transfer.drawing.source import SourcePicture, unfold_source
 from motion_transfer.drawing.window import Window, cut_picture, plan_window
 from motion_transfer.errors import InputError
 from motion_transfer.training.config import build_config
@@ -19,6 +21,7 @@ from motion_transfer.training.samples import (
     number_batches,
     person_window,
 )
+from nhrr_core import ModelConfig
 
 
 def open_samples(
@@ -34,7 +37,7 @@ def open_samples(
         "model.alpha": True,
         "model.clearance": False,
     }
-    known = {name.partition(".")[2]: name for name in (*settings, "run.seed")}
+    known = {name.partition(".")[2]: name for name in (*settings, "model.variant", "run.seed")}
     settings |= {known[key]: value for key, value in changes.items()}
     return TrainingSamples(
         open_pairs(path),
@@ -103,6 +106,21 @@ def test_the_first_samples_have_half_the_sides(paint_pairs, tmp_path) -> None:
     whole, half = (open_samples(path, jitter=0, half_size_samples=count)[0] for count in (0, 1))
     shrunk = torch.nn.functional.avg_pool2d(whole["target_image"], 2)
     assert (half["target_image"] - shrunk).abs().mean() < 0.02, "the same crop"
+
+
+@pytest.mark.parametrize("half", [0, 1])
+def test_the_photo_is_cut_as_rendering_cuts_it(paint_pairs, half: int) -> None:
+    path = paint_pairs(1)
+    sample = open_samples(path, variant="cbi", half_size_samples=half)[0]
+    side = 64 // (1 + half)
+    assert sample["source_pictures"].shape == (1, 6, side, side)
+    source = open_pairs(path)[0].source.load()
+    picture = SourcePicture(source.as_photo(), source.iuv)
+    config = ModelConfig(variant="cbi", image_size=side, texture_size=64)
+    cut = cut_pictures(unfold_source([picture], 64), config)
+    assert cut is not None
+    assert torch.equal(sample["source_pictures"], torch.from_numpy(cut))
+    assert "source_pictures" not in open_samples(path)[0]
 
 
 def test_a_texture_is_halved_over_the_texels_seen(paint_pairs) -> None:

@@ -76,7 +76,10 @@ class Game:
             "target_image": torch.rand(2, 3, 32, 32) * 2 - 1,
             "target_iuv": iuv,
         }
-        if variant in ("full", "ip"):
+        if config.reads_photo:
+            rgb, shown = torch.randint(256, (2, 3, 32, 32)), torch.randint(1, 25, (2, 3, 32, 32))
+            self.batch["source_pictures"] = torch.cat([rgb, shown], 1)[:, None].to(torch.uint8)
+        if config.supervises_texture:
             self.batch["target_texture"] = torch.rand(2, 3, 32, 32) * 2 - 1
             self.batch["target_visibility"] = torch.ones(2, 1, 32, 32)
         if alpha:
@@ -108,16 +111,20 @@ def test_every_variant_trains_all_of_it(variant: str) -> None:
     set_stage(game.model, inpainting=False)
     model, discriminator = copy(game.model), copy(game.discriminator)
     terms = game.update(Judges(Pixels(), FaceIdentity(SphereFace20())))
-    wanted = JUDGED_BY_ALL | ({"texture"} if variant in ("full", "ip") else set())
+    supervised = ("full", "ip", "texture-features", "cbi", "dpt")
+    wanted = JUDGED_BY_ALL | ({"texture"} if variant in supervised else set())
     assert set(terms) == wanted
-    learned = {"render_net"} | ({"feature_net"} if variant in ("full", "no-int") else set())
+    ends_to_end = ("full", "no-int", "texture-features")
+    learned = {"render_net"} | ({"feature_net"} if variant in ends_to_end else set())
+    learned |= {"photo_net"} if variant == "texture-features" else set()
     assert game.changed(model, game.model) == learned
     assert game.changed(discriminator, game.discriminator) == {"scales"}
     assert all(torch.isfinite(term) and not term.requires_grad for term in terms.values())
 
 
-def test_the_first_stage_of_ip_trains_the_inpainting_alone() -> None:
-    game = Game("ip")
+@pytest.mark.parametrize("variant", ["ip", "cbi", "dpt"])
+def test_the_first_stage_trains_the_inpainting_alone(variant: str) -> None:
+    game = Game(variant)
     set_stage(game.model, inpainting=True)
     model, discriminator = copy(game.model), copy(game.discriminator)
     terms = game.update(inpainting=True)

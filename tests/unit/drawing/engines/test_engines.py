@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from unittest.mock import MagicMock
@@ -26,7 +27,8 @@ from motion_transfer.drawing.engines.graph_engine import GraphEngine
 from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine, fast_precisions
 from motion_transfer.drawing.engines.outline import signed_distance
-from motion_transfer.drawing.engines.torch_engine import BATCHES, choose_batch
+from motion_transfer.drawing.engines.torch_engine import BATCHES, choose_batch, cut_pictures
+from motion_transfer.drawing.source import dress, unfold_source
 from motion_transfer.drawing.unfolding import pixels_per_texel
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.evaluation.calibration import measure_ranges
@@ -109,6 +111,60 @@ def test_engines_draw_what_torch_draws(
     away = np.abs(drawn.astype(int) - expected)
     assert away.max() <= levels
     assert away.mean() <= max(0.05, levels / 8)  # weights at random exaggerate
+
+
+@pytest.fixture(params=["texture-features", "cbi", "dpt"])
+def reading(request, tmp_path: Path) -> Path:
+    """Weights of a variant that reads the photo itself."""
+    torch.manual_seed(0)
+    small = {"feature_width": 4, "render_width": 8, "texture_size": 64, "image_size": SIDE}
+    config = ModelConfig.preset("lite", alpha=True, variant=request.param, **small)
+    path = tmp_path / f"{request.param}.safetensors"
+    save_checkpoint(path, NeuralReRenderer(config))
+    return path
+
+
+def test_variants_that_read_the_photo(reading: Path, source, crops: np.ndarray) -> None:
+    exact = open_engine(reading, EXACT)
+    feature_map = exact.encode(source)
+    expected = exact.draw(exact.take(feature_map), crops)
+    assert expected.shape == (3, SIDE, SIDE, 4)
+    how = choose_execution(Wish(precision="f32", device="cpu"), inspect_checkpoint(reading))
+    engine = open_engine(reading, how)
+    np.testing.assert_array_equal(engine.encode(source), feature_map)
+    away = np.abs(engine.draw(engine.take(feature_map), crops).astype(int) - expected)
+    assert away.max() <= 1
+    if reading.stem != "dpt":
+        assert how.engine == "openvino"
+        return
+    assert how.engine == "torch"
+    message = f"--engine openvino does not run variant dpt of weights {reading}; choose"
+    with pytest.raises(InputError, match=message):
+        choose_execution(Wish(engine="openvino"), inspect_checkpoint(reading))
+
+
+def test_a_garment_hides_what_the_person_wore(reading: Path, source, studio) -> None:
+    """Texels of the parts that it gives are no longer seen in the person's photo."""
+    engine = open_engine(reading, EXACT)
+    person, garment = source.pictures[0], replace(source.pictures[0], parts=(2,))
+    rest = tuple(part for part in person.parts if part != 2)
+    whole, cut = (
+        cut_pictures(source, engine.config),
+        cut_pictures(
+            dress(unfold_source([replace(person, parts=rest)], 128), [garment]), engine.config
+        ),
+    )
+    assert whole is not None and cut is not None
+    assert (
+        (whole[:, 3] == 2).any() and (cut[0, 3] != 2).all() and set(np.unique(cut[1, 3])) == {0, 2}
+    )
+
+
+def test_photos_that_a_kept_source_lacks_are_asked_for(reading: Path, source) -> None:
+    engine = open_engine(reading, EXACT)
+    kept = replace(source, pictures=(), kept=Path("me.mtsource"))
+    with pytest.raises(InputError, match=r"source me\.mtsource does not hold all of its photos"):
+        engine.encode(kept)
 
 
 @pytest.mark.parametrize("name", ["openvino", "onnx"])
