@@ -63,7 +63,7 @@ def open_methods(results: Sequence[str]) -> list[MethodFolder]:
     if len(methods) < 2:
         raise InputError(f"a study compares two methods or more; {len(methods)} was given")
     labels = [method.label for method in methods]
-    for method in methods:
+    for method in reversed(methods):
         if labels.count(method.label) > 1:
             raise InputError(
                 f"two methods are called {method.label!r}; rename one, as NAME={method.path}"

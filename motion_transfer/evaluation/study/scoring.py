@@ -19,7 +19,7 @@ from motion_transfer.evaluation.study.statistics import (
 )
 
 Label = str
-Tally = dict[str, Counter[Label]]
+Tally = dict[str, dict[Label, int]]
 """Votes for each of two methods, by item."""
 
 
@@ -130,7 +130,7 @@ def _prefer(
     readers: Sequence[Reader], key: Key, question: str, method: Label, other: Label
 ) -> Preference | None:
     """Count the votes between two methods; None where there are none."""
-    tally: Tally = defaultdict(Counter)
+    tally: Tally = defaultdict(lambda: {method: 0, other: 0})
     by_reader = []
     for reader in readers:
         votes: Counter[Label] = Counter()
@@ -195,10 +195,9 @@ def _cross(preferences: Sequence[Preference]) -> Iterable[Crossing]:
         yield Crossing(method, other, dict(counts))
 
 
-def _winner(votes: Counter[Label]) -> Label | None:
+def _winner(votes: dict[Label, int]) -> Label | None:
     """Whom most preferred; None for a tie."""
-    ranked = votes.most_common(2)
-    return None if len(ranked) == 2 and ranked[0][1] == ranked[1][1] else ranked[0][0]
+    return None if len(set(votes.values())) == 1 else max(votes, key=lambda label: votes[label])
 
 
 def _describe(reader: Reader) -> ReaderFacts:

@@ -21,6 +21,10 @@ PLAYED = ("h264", "vp9", "av1")
 PLAYED_PIXELS = ("yuv420p", "yuvj420p")
 """What every browser plays of them; of 10 bits or 4:4:4, some show nothing."""
 
+TIMED = {"mp4", "matroska"}
+"""Of containers that say when a frame is shown; AVI only tells the order of decoding."""
+
+REMEDY = "`ffmpeg -i FILE -pix_fmt yuv420p FILE.mp4`"
 WITHOUT_REMARKS = "filter_units=remove_types=6"  # H.264's SEI, where x264 writes its settings
 OPTIONS = {"fflags": "+bitexact", "movflags": "+faststart"}  # bitexact: no name of the program
 
@@ -46,15 +50,16 @@ def copy_for_browsers(path: Path, destination: Path) -> BareVideo:
             if name not in PLAYED or pixels not in PLAYED_PIXELS:
                 raise InputError(
                     f"video {path} is {name} in {pixels}, which not all browsers play; encode it"
-                    " as H.264 in yuv420p, such as by `ffmpeg -i FILE -pix_fmt yuv420p FILE.mp4`"
+                    f" as H.264 in yuv420p, such as by {REMEDY}"
                 )
             packets = [packet for packet in source.demux(stream) if packet.size]
             if not packets:
                 raise InputError(f"video {path} holds no frames; export it again")
             times = [packet.pts for packet in packets if packet.pts is not None]
-            if len(times) < len(packets):
+            if len(times) < len(packets) or not TIMED & set(source.format.name.split(",")):
                 raise InputError(
-                    f"video {path} does not say when its frames are shown; save it as MP4"
+                    f"video {path} does not say when each frame is shown; save it as MP4, such as"
+                    f" by {REMEDY}"
                 )
             shown = sorted(times)
             # decoding begins as much earlier as a frame ever needs; Matroska does not tell when

@@ -7,7 +7,6 @@ const sheet = new Sheet(STUDY);
 const sides = [...document.querySelectorAll(".view")];
 const views = new Views(sides.map((side) => side.querySelector(".frame")));
 const collector = document.documentElement.dataset.answers; // where `mt` takes answers, if it serves
-let open = false; // whether an answer is taken
 let since = 0;
 let saved = false;
 
@@ -15,12 +14,21 @@ function filesOf({ comparison, left }) {
   return [comparison[left], comparison[otherView(left)]];
 }
 
+/** Whether an answer is taken: not while the views are loading. */
+function isOpen() {
+  return byId("views").ariaBusy === "false";
+}
+
+function setOpen(open) {
+  byId("views").ariaBusy = String(!open);
+}
+
 function showScreen(name) {
   document.querySelectorAll("main").forEach((screen) => (screen.hidden = screen.id !== name));
 }
 
 async function show() {
-  open = false;
+  setOpen(false);
   byId("trouble").textContent = "";
   if (sheet.position >= sheet.total) {
     showSigning();
@@ -50,11 +58,11 @@ async function show() {
     byId("trouble").textContent = "This browser keeps nothing: do not close the page until the end.";
   }
   since = performance.now();
-  open = true;
+  setOpen(true);
 }
 
 function answer(side) {
-  if (!open) return;
+  if (!isOpen()) return;
   sheet.answer(side, performance.now() - since);
   saved = false;
   const chosen = sides.find((each) => each.dataset.side === side);
@@ -151,6 +159,7 @@ function setUp() {
   byId("pair-count").textContent =
     `${pairs} pair${pairs === 1 ? "" : "s"} of ${anyVideo ? "videos" : "pictures"}`;
   document.body.classList.toggle("pictures", !anyVideo);
+  byId("again").hidden = STUDY.repeats === 0;
   sides.forEach((side) => side.addEventListener("click", () => answer(side.dataset.side)));
   byId("begin").addEventListener("click", show);
   byId("back").addEventListener("click", goBack);
