@@ -83,7 +83,8 @@ class Reading:
         question = "realism" if self.page.inner_text("#question") == REALISM else "identity"
         images = self.page.locator(".view .frame img").all()
         shown = [self.files[str(image.get_attribute("src"))].split(": ") for image in images]
-        assert shown[0][1] == shown[1][1]
+        source = self.page.locator("#source img").get_attribute("src")
+        assert shown[0][1] == shown[1][1] == self.files[str(source)].removeprefix("source: ")
         return question, shown[0][1], [method for method, _ in shown]
 
     def answer_all(self, press: Callable[[str], None], choose: Choose, start: int = 1) -> None:
@@ -139,6 +140,12 @@ def test_two_readers_from_files_to_results(studio, mt, browser, study: Path) -> 
 
     orders = [json.loads(file.read_text())["answers"] for file in (first, second)]
     assert [each["comparison"] for each in orders[0]] != [each["comparison"] for each in orders[1]]
+
+    for answers in orders:
+        before = {each["comparison"]: each["left"] for each in answers if not each["repeat"]}
+        again = [each for each in answers if each["repeat"]]
+        assert len(again) == REPEATS
+        assert all(each["left"] != before[each["comparison"]] for each in again)
 
     scored = mt("eval", "study", "--score", first, second)
     assert (scored.code, scored.err) == (0, "")

@@ -11,6 +11,7 @@ from motion_transfer.option import REQUIRED, option
 ASKING = "What is asked"
 OUTPUT = "Output"
 SCORING = "Scoring answers"
+MOST_PAIRS = 300  # more than an hour: nobody looks as carefully at the last ones
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +59,8 @@ class StudyOptions:
     )
 
     def __post_init__(self) -> None:
-        if self.per_reader < 1:
-            raise InputError(f"per-reader is {self.per_reader}; it must be at least 1")
+        if not 1 <= self.per_reader <= MOST_PAIRS:
+            raise InputError(f"per-reader is {self.per_reader}; it must lie in 1..{MOST_PAIRS}")
         if self.repeats < 0:
             raise InputError(f"repeats is {self.repeats}; it must be at least 0")
 

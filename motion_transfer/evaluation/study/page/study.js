@@ -126,7 +126,7 @@ async function send() {
   byId("send").disabled = true;
   try {
     const headers = { "Content-Type": "application/json" };
-    const response = await fetch(collector, { method: "POST", headers, body: signedText() });
+    const response = await fetch(collector, { method: "POST", headers, body: JSON.stringify(sheet.sign()) });
     if (!response.ok) throw new Error((await response.json()).error);
     tell("Sent. That is all; thank you.");
   } catch (error) {

@@ -1,7 +1,8 @@
 "use strict";
 // Pictures or videos side by side; videos start together, stay together, and begin again together.
 
-const DRIFT_SECONDS = 0.08; // two frames: less is not seen, and each correction is a jerk
+const CATCH_UP = 2; // of a drift, a second: what is left after a quarter of one is half
+const SPEEDS = [0.5, 1.5];
 
 function isVideo(file) {
   return file.endsWith(".mp4");
@@ -17,7 +18,9 @@ function makeView(file) {
 function ready(view) {
   if (view instanceof HTMLImageElement) return view.decode();
   return new Promise((resolve, reject) => {
+    if (view.error) reject(new Error("no video"));
     if (view.readyState >= HTMLMediaElement.HAVE_ENOUGH_DATA) resolve();
+    view.play().catch(() => {}); // some phones load nothing before
     view.addEventListener("canplaythrough", () => resolve(), { once: true });
     view.addEventListener("error", () => reject(new Error("no video")), { once: true });
   });
@@ -62,16 +65,27 @@ class Views {
     return this.shown.some((view) => view instanceof HTMLVideoElement);
   }
 
-  replay() {
+  /** Begin again together: each when both are back at the beginning. */
+  async replay() {
+    const views = this.shown;
     if (!this.hasVideos) return;
-    this.shown.forEach((video) => (video.currentTime = 0));
-    this.shown.forEach((video) => video.play().catch(() => {})); // not before the first touch
+    await Promise.all(views.map(rewind));
+    if (this.shown !== views) return;
+    views.forEach((video) => video.play().catch(() => {})); // not before the first touch
   }
 
+  /** By speed, as each jump would be a jerk. */
   #keepTogether([first, second]) {
-    if (first.ended || second.ended || second.seeking) return;
-    if (Math.abs(first.currentTime - second.currentTime) > DRIFT_SECONDS) {
-      second.currentTime = first.currentTime;
-    }
+    const drift = second.ended || first.ended ? 0 : first.currentTime - second.currentTime;
+    second.playbackRate = Math.min(SPEEDS[1], Math.max(SPEEDS[0], 1 + CATCH_UP * drift));
   }
+}
+
+function rewind(video) {
+  video.pause();
+  if (video.currentTime === 0) return null;
+  return new Promise((resolve) => {
+    video.addEventListener("seeked", resolve, { once: true });
+    video.currentTime = 0;
+  });
 }
