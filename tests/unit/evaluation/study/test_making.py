@@ -15,7 +15,12 @@ from PIL.PngImagePlugin import PngInfo
 
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.evaluation.study.key import Key, read_key
-from motion_transfer.evaluation.study.making import choose_pairs, draw_comparisons, make_study
+from motion_transfer.evaluation.study.making import (
+    SAME_TIME_SECONDS,
+    choose_pairs,
+    draw_comparisons,
+    make_study,
+)
 from motion_transfer.evaluation.study.options import StudyOptions
 
 LABELS = ("Chromogen", "Umbriel")
@@ -59,7 +64,7 @@ def test_nothing_in_the_page_tells_the_method(study) -> None:
             assert word not in str(file.relative_to(page))
             if word != "person" or file.parent.name == "media":  # the page's own words have it
                 assert word.encode() not in file.read_bytes(), f"{word} in {file}"
-    assert len({file.stat().st_mtime for file in page.rglob("*")}) == 1
+    assert {path.stat().st_mtime for path in (page, *page.rglob("*"))} == {SAME_TIME_SECONDS}
 
 
 def test_the_key_says_what_every_view_is(study) -> None:
