@@ -51,8 +51,16 @@ class SectionCommand(click.Command):
                 formatter.write_dl(records)
 
 
+class SectionGroup(SectionCommand, click.Group):
+    """A command with options under headings, below which other commands stand."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_options(ctx, formatter)
+        self.format_commands(ctx, formatter)
+
+
 class WordsCommand(SectionCommand):
-    """A command without arguments, whose repeatable options take several words at once.
+    """A command whose repeatable options take several words at once; arguments come before them.
 
     `--weights a b --weights c` is `--weights a --weights b --weights c`.
     """
@@ -76,6 +84,15 @@ class WordsCommand(SectionCommand):
                 used = True
             spread.append(word)
         return super().parse_args(ctx, spread)
+
+
+class WordsGroup(WordsCommand, SectionGroup):
+    """The same as a command that others stand below."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args[:1] and args[0] in self.commands:  # whose words are its own to spread
+            return SectionGroup.parse_args(self, ctx, args)
+        return super().parse_args(ctx, args)
 
 
 def described_options(options_class: type, *, required: bool = True) -> Decorator:

@@ -14,7 +14,7 @@ from typing import Any, NoReturn, Self
 import click
 from tqdm import tqdm
 
-from motion_transfer.cli.options import SectionCommand, described_options, section
+from motion_transfer.cli.options import SectionGroup, described_options, section
 from motion_transfer.cli.people import prepare_body_model
 from motion_transfer.cli.progress import CountBar
 from motion_transfer.errors import InputError
@@ -41,15 +41,7 @@ def setting_options(command: Any) -> Any:
     return command
 
 
-class TrainGroup(SectionCommand, click.Group):
-    """A command with options under headings, below which other commands stand."""
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        super().format_options(ctx, formatter)
-        self.format_commands(ctx, formatter)
-
-
-@click.group(cls=TrainGroup, invoke_without_command=True, subcommand_metavar="[iuv ...]")
+@click.group(cls=SectionGroup, invoke_without_command=True, subcommand_metavar="[iuv ...]")
 @run_option("-o", "--output", type=FILE, metavar="RUN", help="A new folder for the run.")
 @run_option("--resume", type=FILE, metavar="RUN", help="Go on with a run that was stopped.")
 @run_option("--config", type=FILE, help="A train.toml; options and --set come after it.")

@@ -14,7 +14,8 @@ pytest.importorskip("starlette", reason="needs the `preview` extra")
 from starlette.testclient import TestClient
 
 from motion_transfer.preview.dropped import MOST_FILE_BYTES
-from motion_transfer.preview.server import MOST_BODY_BYTES, Guard, make_app
+from motion_transfer.preview.local import MOST_BODY_BYTES, Guard
+from motion_transfer.preview.server import make_app
 
 TOKEN = "secret"
 
