@@ -6,7 +6,7 @@ import pickle
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -31,7 +31,7 @@ from motion_transfer.media.publish import (
     publish,
     work_folder,
 )
-from motion_transfer.media.work import WorkFolder, digest_file, key_of, publish_piece, was_published
+from motion_transfer.media.work import WorkFolder, key_of, publish_piece, was_published
 from motion_transfer.render.chunks import PICKLE_PROTOCOL, render
 from motion_transfer.render.composition import Composed, Prepared, compose, read_format
 from motion_transfer.render.crew import Crew, result_of
@@ -39,6 +39,7 @@ from motion_transfer.render.driver import DriverScan
 from motion_transfer.render.engine import ContactSheet, Engine
 from motion_transfer.render.options import OutputOptions, RenderOptions
 from motion_transfer.render.plan import Chunk, describe_missing
+from motion_transfer.render.provenance import mark_with
 
 
 @dataclass(frozen=True)
@@ -152,13 +153,14 @@ def piece_of(prepared: Prepared, chunk: Chunk) -> str:
     return segment_path(Path(), chunk.index, prepared.output_format).name
 
 
-def output_key(prepared: Prepared) -> str:
-    """Compute the key of the whole output. Raises: InputError if its sound is gone."""
-    audio = prepared.audio
+def output_key(options: OutputOptions, prepared: Prepared) -> str:
+    """Compute the key of the whole output."""
     return key_of(
         {
             "chunks": prepared.chunk_keys,
-            "audio": audio and [digest_file(audio.path, "audio"), str(audio)],
+            "audio": prepared.audio,
+            "record": asdict(prepared.record),
+            "told": [options.provenance, options.credentials_cert, options.credentials_key],
         }
     )
 
@@ -176,12 +178,18 @@ def assemble(
         for chunk in prepared.plan.chunks
     ]
     join_segments(
-        segments, finished, prepared.output_format, prepared.plan.frame_rate, prepared.audio
+        segments,
+        finished,
+        prepared.output_format,
+        prepared.plan.frame_rate,
+        prepared.audio,
+        mark_with(prepared.record, full=options.provenance == "full"),
     )
     prepared.inputs.check()
     if sheet is not None and options.sheet is not None:
         with work_folder(options.sheet) as place:
-            write_png(place / "sheet.png", sheet.picture())
+            mark = prepared.output_format.mark
+            write_png(place / "sheet.png", sheet.picture(), mark and mark.xmp())
             publish(place / "sheet.png", options.sheet)
     return finished
 
@@ -229,7 +237,7 @@ def _render(
     options: RenderOptions, composed: Composed, work: WorkFolder, listener: Listener, crew: Crew
 ) -> None:
     prepared = composed.prepared
-    key = output_key(prepared)
+    key = output_key(options, prepared)
     if work.published(key):
         work.clear()
         return

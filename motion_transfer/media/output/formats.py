@@ -52,7 +52,7 @@ class OutputKind:
         suffixes: Endings of its names, lower case; an empty one is a folder's.
         help: The endings, in the words of messages.
         module: Where its `open_segment`, `join_segments`, `digest_output` and `read_mark` are,
-            which do what those of `segments` say; it is imported when the first output of this kind is made.
+            which do what those of `segments` say; it is imported when it is first needed.
         segment_suffix: The ending of a segment's name, where segments are no videos.
         has_sound: Whether it holds sound.
         several: Whether it holds several frames.
