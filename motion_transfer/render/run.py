@@ -194,6 +194,18 @@ def assemble(
     return finished
 
 
+def open_engine(composed: Composed, **more: Any) -> Engine:
+    """Open the engine of a run. Args: more: What else an `Engine` takes. Raises: InputError."""
+    prepared = composed.prepared
+    return Engine(
+        prepared,
+        readers=prepared.open_people(),
+        renderers=[prepared.recipe.renderer(each) for each in composed.appearances],
+        backdrop=prepared.backdrop.open(),
+        **more,
+    )
+
+
 class _ChunkTasks:
     """Chunks of one run as tasks of its crew."""
 
@@ -265,15 +277,8 @@ def _render(
     chunks = [(chunk, work.temporary(piece_of(prepared, chunk))) for chunk in missing]
     try:
         with explain_disk_errors(options.output):
-            engine = Engine(
-                prepared,
-                readers=prepared.open_people(),
-                renderers=[prepared.recipe.renderer(each) for each in composed.appearances],
-                backdrop=prepared.backdrop.open(),
-                sheet=sheet,
-                listener=listener,
-                helpers=_ChunkTasks(options, composed, work, crew, note),
-            )
+            helpers = _ChunkTasks(options, composed, work, crew, note)
+            engine = open_engine(composed, sheet=sheet, listener=listener, helpers=helpers)
             engine.render(chunks, options.worker_count, finish)
             finished = assemble(options, prepared, work.path, sheet)
             work.publish(finished, key)
