@@ -21,6 +21,7 @@ from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.events import Listener, Notice
+from motion_transfer.media.credentials import check_credentials
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.output.audio import AudioCut, choose_audio
 from motion_transfer.media.output.formats import OutputFormat, choose_format
@@ -133,6 +134,8 @@ def compose(
 def check_early(options: RenderOptions) -> None:
     """Refuse what can be refused at once: to find people may take long. Raises: InputError."""
     read_format(options)
+    if options.credentials_cert is not None and options.credentials_key is not None:
+        check_credentials(options.output, options.credentials_cert, options.credentials_key)
     check_photos(options)
     for partner in options.partners:
         if not partner.photo.exists():

@@ -23,7 +23,8 @@ from motion_transfer.events import (
     Started,
     ignore,
 )
-from motion_transfer.media.output.segments import join_segments, segment_path
+from motion_transfer.media.credentials import sign
+from motion_transfer.media.output.segments import join_segments, read_mark, segment_path
 from motion_transfer.media.pictures.photo import write_png
 from motion_transfer.media.publish import (
     check_destination,
@@ -166,7 +167,7 @@ def output_key(options: OutputOptions, prepared: Prepared) -> str:
 
 
 def assemble(
-    options: OutputOptions, prepared: Prepared, folder: Path, sheet: ContactSheet | None
+    options: RenderOptions, prepared: Prepared, folder: Path, sheet: ContactSheet | None
 ) -> Path:
     """Join the segments in a work folder to an output without its name yet; write the sheet.
 
@@ -185,6 +186,8 @@ def assemble(
         prepared.audio,
         mark_with(prepared.record, full=options.provenance == "full"),
     )
+    if options.credentials_cert is not None and options.credentials_key is not None:
+        finished = _sign(options, finished)
     prepared.inputs.check()
     if sheet is not None and options.sheet is not None:
         with work_folder(options.sheet) as place:
@@ -192,6 +195,25 @@ def assemble(
             write_png(place / "sheet.png", sheet.picture(), mark and mark.xmp())
             publish(place / "sheet.png", options.sheet)
     return finished
+
+
+def _sign(options: RenderOptions, finished: Path) -> Path:
+    """Sign a finished output. Returns: The signed one. Raises: InputError."""
+    mark = read_mark(finished)
+    assert mark and options.credentials_cert and options.credentials_key
+    signed = finished.with_name(f"signed.part-0{finished.suffix}")
+    sign(
+        finished,
+        signed,
+        title=options.output.name,
+        source_type=mark.term,
+        record=mark.record,
+        ingredients=options.source if mark.record else (),
+        certificate=options.credentials_cert,
+        key=options.credentials_key,
+    )
+    finished.unlink()
+    return signed
 
 
 def open_engine(composed: Composed, **more: Any) -> Engine:

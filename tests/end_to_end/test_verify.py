@@ -1,4 +1,4 @@
-"""`mt verify` through the real command: what was edited, which input changed, what is drawn again."""
+"""`mt verify` through the real command: edits, inputs that changed, what is drawn again."""
 
 from __future__ import annotations
 
