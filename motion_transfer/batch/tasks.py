@@ -153,7 +153,7 @@ def prepare(
         recipe.name,
         # a thread that draws for itself would gain nothing from a second chunk
         CHUNKS_AT_ONCE if recipe.occupies != "nothing" else 1,
-        output_key(run),
+        output_key(options, run),
         "; ".join(filter(None, [*notices, missing])),
         run.inputs.keys(),
     )

@@ -15,13 +15,21 @@ from motion_transfer.media.iuv.formats import ChannelOrder
 
 
 @click.command()
-@click.argument("topic", type=click.Choice(["all", "parts"]), default="all")
+@click.argument("topic", default="all", metavar="[all|parts|PATH]")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def info(topic: str, as_json: bool) -> None:
-    """Versions, device, renderers, sizes of a run; `mt info parts` lists part names."""
-    from motion_transfer.render.about import describe_parts, describe_setup
+    """Versions, device, renderers, sizes of a run; `mt info parts` lists part names.
 
-    _tell(describe_parts() if topic == "parts" else describe_setup(), as_json)
+    Of a file or folder it tells what `mt inspect` does: of an output, what made it.
+
+    \b
+    mt info
+    mt info out.mp4
+    """
+    from motion_transfer.render.about import describe_parts, describe_path, describe_setup
+
+    topics = {"all": describe_setup, "parts": describe_parts}
+    _tell(topics[topic]() if topic in topics else describe_path(Path(topic)), as_json)
 
 
 def _tell(facts: dict[str, Any], as_json: bool) -> None:
@@ -63,7 +71,8 @@ def inspect(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Say what PATH holds: IUV (order, size, parts, gaps, people), photo, weights, kept source.
+    """Say what PATH holds: IUV (order, size, parts, gaps, people), photo, weights, kept source; or
+    what made it, if it is an output of this program.
 
     Of several photos of one person (or with --coverage also of one, of a folder or a video): how
     much of the body they show, which of them, how well, and which photo would help most.

@@ -32,8 +32,9 @@ COMMANDS = {
     "calibrate": "Let a checkpoint's network be computed in 8 bits, twice as fast.",
     "export": "Write the networks as ONNX, OpenVINO or TensorRT files, for other programs.",
     "iuv": "IUV from photos and videos; convert IUV between formats, repair it.",
-    "inspect": "Say what an IUV file, driver, photo or weights file holds.",
-    "info": "Versions, device, renderers, sizes of a run; part names.",
+    "inspect": "Say what an IUV file, driver, photo, output or weights file holds.",
+    "verify": "Whether an output is what its record says: untouched, of these inputs.",
+    "info": "Versions, device, renderers, sizes of a run; part names; what made an output.",
 }
 HOMES = {"demo": "run", "inspect": "info", "models": "info"}
 """Commands that stand in another one's module."""

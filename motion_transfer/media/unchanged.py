@@ -110,6 +110,18 @@ class Inputs:
             yield item
         self.check()
 
+    def digest(self, path: Path) -> str | None:
+        """Tell the content of a file or folder as it was noted; None of what was not there.
+
+        Returns: The algorithm and the digest: XXH3 of a file, and of a folder the SHA-256 of names
+            with the XXH3 of each.
+        """
+        known = self._known[path]
+        if str(path) in known:
+            return f"xxh3-128:{known[str(path)].digest}"
+        by_file = {file: seen.digest for file, seen in known.items()}
+        return f"names-and-xxh3-128:{_key(by_file)}" if by_file else None
+
     def keys(self) -> dict[str, list[str]]:
         """Tell, by path, the keys that `status_key` and `content_key` gave when it was noted."""
         return {

@@ -10,24 +10,25 @@ from typing import Any
 import yaml
 
 from motion_transfer.media.iuv.formats import names_file
-from motion_transfer.option import Option, list_options, parse_background
-from motion_transfer.render.options import NO_AUDIO, Garment, Partner, RenderOptions
-from motion_transfer.weights import SHIPPED
-from nhrr_core.parts import PART_NAMES
-
-NAMES = ("audio", NO_AUDIO), *(("weights", name) for name in SHIPPED)
-"""Options and words that stand in a path's place and are none."""
+from motion_transfer.option import Option
+from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.options.written import (
+    list_written,
+    second_word,
+    write_text,
+    write_value,
+)
 
 
 def command_line(options: RenderOptions) -> str:
     """Write the `mt run` that does the same, for a POSIX shell."""
     words = ["mt", "run"]
-    for entry, value in _written(options):
+    for entry, value in list_written(options):
         flag = entry.flags[0]
         if entry.kind in ("garments", "partners"):
             for each in value:
                 iuv = f",{each.iuv}" if each.iuv else ""
-                words += [flag, f"{each.photo}{iuv}", entry.flags[1], _second_word(each)[1]]
+                words += [flag, f"{each.photo}{iuv}", entry.flags[1], second_word(each)[1]]
         elif entry.kind == "paths":
             words += [word for path in value for word in (flag, str(path))]
         elif entry.kind == "flag":
@@ -36,7 +37,7 @@ def command_line(options: RenderOptions) -> str:
             on, off = flag.split("/")
             words.append(on if value else off)
         else:
-            words += [flag, _text(entry, value)]
+            words += [flag, write_text(entry, value)]
     return shlex.join(words)
 
 
@@ -46,10 +47,18 @@ def manifest_text(options: RenderOptions, manifest: Path) -> str:
     Paths below the manifest's folder are written relative to it, so that the folder can move.
     """
     folder = manifest.absolute().parent
+
+    def name(entry: Option, path: Path) -> str:
+        if not names_file(path):
+            return str(path)
+        below = _below(path, folder)
+        # marks of a glob in a file's name are to mean themselves
+        return glob.escape(below) if entry.name in ("source", "driver") else below
+
     job: dict[str, Any] = {}
-    for entry, value in _written(options):
+    for entry, value in list_written(options):
         if entry.in_manifest and entry.name not in ("output", "sheet"):
-            job[entry.word] = _manifest_value(entry, value, folder)
+            job[entry.word] = write_value(entry, value, name)
     root = options.output.absolute().parent
     job["output"] = _template(options.output.name)
     whole: dict[str, Any] = {"version": 1, "output_root": _below(root, folder)}
@@ -59,55 +68,6 @@ def manifest_text(options: RenderOptions, manifest: Path) -> str:
             whole["outside_outputs"] = True
     whole["jobs"] = [job]
     return yaml.safe_dump(whole, sort_keys=False, allow_unicode=True)
-
-
-def _written(options: RenderOptions) -> list[tuple[Option, Any]]:
-    """List the options that differ from their defaults, in the order of the help."""
-    entries = [(entry, getattr(options, entry.name)) for entry in list_options(RenderOptions)]
-    return [(entry, value) for entry, value in entries if entry.required or value != entry.default]
-
-
-def _manifest_value(entry: Option, value: Any, folder: Path) -> Any:
-    if entry.kind in ("garments", "partners"):
-        return [
-            {
-                "photo": _below(each.photo, folder),
-                **dict([_second_word(each)]),
-                **({"iuv": _below(each.iuv, folder)} if each.iuv else {}),
-            }
-            for each in value
-        ]
-    if entry.kind == "background":
-        behind = parse_background(value)
-        return _below(behind, folder) if isinstance(behind, Path) else value
-    if entry.kind == "path":
-        return _manifest_path(entry, value, folder)
-    if entry.kind == "paths":
-        paths = [_manifest_path(entry, path, folder) for path in value]
-        return paths if len(paths) > 1 else paths[0]
-    return value if entry.kind in ("flag", "switch", "integer", "number") else _text(entry, value)
-
-
-def _manifest_path(entry: Option, value: Path, folder: Path) -> str:
-    if (entry.name, str(value)) in NAMES or not names_file(value):
-        return str(value)
-    path = _below(value, folder)
-    # marks of a glob in a file's name are to mean themselves
-    return glob.escape(path) if entry.name in ("source", "driver") else path
-
-
-def _text(entry: Option, value: Any) -> str:
-    if entry.kind == "frames":
-        start, stop = ("" if end is None else str(end) for end in value)
-        return f"{start}:{stop}"
-    return str(value)
-
-
-def _second_word(entry: Garment | Partner) -> tuple[str, str]:
-    """Write what a photo is given with, and its name in a manifest."""
-    if isinstance(entry, Partner):
-        return "person", entry.person
-    return "parts", ",".join(PART_NAMES[part] for part in entry.parts)
 
 
 def _below(path: Path, folder: Path) -> str:

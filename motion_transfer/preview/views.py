@@ -18,6 +18,7 @@ from motion_transfer.drawing.source import Source
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.events import Listener, ignore
 from motion_transfer.media.iuv.opening import read_single_iuv
+from motion_transfer.media.output.marks import Mark
 from motion_transfer.media.pictures.formats import open_pictures
 from motion_transfer.media.pictures.photo import encode_jpeg, read_photo, write_png
 from motion_transfer.media.publish import check_destination, publish, work_folder
@@ -27,6 +28,7 @@ from motion_transfer.preview.scenes import Scenes
 from motion_transfer.render.composition import open_recipe
 from motion_transfer.render.driver import open_driver
 from motion_transfer.render.options import RendererOptions, RenderOptions, SourceOptions
+from motion_transfer.render.provenance import source_type_of
 from motion_transfer.render.source import read_source
 
 KEPT = 4  # results of each step: some options back and forth without waiting
@@ -137,7 +139,7 @@ def write_frame(options: RenderOptions, index: int, output: Path) -> None:
         if index in driver.broken:
             raise InputError(driver.broken[index])
         picture = Views().result(options, driver, plan_frames(driver, options), index)
-        write_png(folder / "frame.png", picture)
+        write_png(folder / "frame.png", picture, Mark(source_type_of(options)).xmp())
         publish(folder / "frame.png", output)
 
 

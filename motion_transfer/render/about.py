@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import sys
 from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,10 +32,13 @@ from motion_transfer.media.iuv.formats import (
 )
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvStream
+from motion_transfer.media.output.marks import Mark
+from motion_transfer.media.output.segments import read_mark
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES, open_pictures
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.render.options import is_kept
+from motion_transfer.render.provenance import parse_record
 from motion_transfer.version import __version__, package_version
 from motion_transfer.weights import DEFAULT_WEIGHTS, SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import inspect_checkpoint
@@ -123,6 +127,8 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
     if order is not None and order not in CHANNEL_ORDERS:
         raise InputError(f"channel order {order!r}; supported are {', '.join(CHANNEL_ORDERS)}")
     suffix = path.suffix.lower()
+    if (mark := read_mark(path)) is not None:
+        return _describe_output(path, mark)
     if is_kept(path):
         return _describe_kept(path)
     if suffix == ".safetensors":
@@ -139,6 +145,21 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
             return _describe_photo(path) | ({"not IUV": str(error)} if may_be_iuv else {})
         except InputError as no_photo:
             raise (no_photo if may_be_iuv else error) from None
+
+
+def _describe_output(path: Path, mark: Mark) -> Facts:
+    facts: Facts = {"what": "an output of motion-transfer", "mark": mark.sentence}
+    if mark.record is None:
+        return facts | {"record": "none (--provenance mark)"}
+    record = asdict(parse_record(mark.record, path))
+    people = [
+        {str(number): picture for number, picture in enumerate(pictures, start=1)}
+        for pictures in record["sources"]
+    ]
+    record["sources"] = people[0]
+    if people[1:]:
+        record["partners"] = {str(number): each for number, each in enumerate(people[1:], 1)}
+    return facts | record
 
 
 def _describe_shipped(name: str) -> str:

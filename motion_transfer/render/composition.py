@@ -21,16 +21,18 @@ from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.events import Listener, Notice
+from motion_transfer.media.credentials import check_credentials
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.output.audio import AudioCut, choose_audio
 from motion_transfer.media.output.formats import OutputFormat, choose_format
+from motion_transfer.media.output.marks import Mark
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.render.backdrop import (
     Backdrop,
     count_until_end,
     open_background,
 )
-from motion_transfer.render.content import chunk_key, run_key
+from motion_transfer.render.content import chunk_key, read_contents, run_key
 from motion_transfer.render.crew import Crew
 from motion_transfer.render.driver import DriverScan, scan_driver
 from motion_transfer.render.inputs import appearance_files, audio_files
@@ -43,6 +45,7 @@ from motion_transfer.render.options import (
     parse_window,
 )
 from motion_transfer.render.plan import DriverPlan, plan_path
+from motion_transfer.render.provenance import Record, describe_run, source_type_of
 from motion_transfer.render.scene import Actor, is_in_place, make_actors, make_canvas, open_backdrop
 from motion_transfer.render.source import check_photos, read_source
 
@@ -56,6 +59,7 @@ class Prepared:
         crops: Whether the output is the square that was drawn, and no frame of the driver.
         chunk_keys: Of the content that each chunk is made from.
         inputs: All files that it is made from.
+        record: What the output says of itself.
     """
 
     actors: tuple[Actor, ...]
@@ -67,6 +71,7 @@ class Prepared:
     audio: AudioCut | None
     chunk_keys: tuple[str, ...]
     inputs: Inputs
+    record: Record
 
     @property
     def plan(self) -> DriverPlan:
@@ -129,6 +134,8 @@ def compose(
 def check_early(options: RenderOptions) -> None:
     """Refuse what can be refused at once: to find people may take long. Raises: InputError."""
     read_format(options)
+    if options.credentials_cert is not None and options.credentials_key is not None:
+        check_credentials(options.output, options.credentials_cert, options.credentials_key)
     check_photos(options)
     for partner in options.partners:
         if not partner.photo.exists():
@@ -274,15 +281,17 @@ def prepare_run(
     inputs |= Inputs(audio_files(options))
     for each in scans:
         inputs |= each.inputs
-    output_format = read_format(options)
+    output_format = replace(read_format(options), mark=Mark(source_type_of(options)))
     _check_length(options, output_format, plan)
     recipe.make_ready([shot.window.side for plan in plans for shot in plan.shots])
     working_size = recipe.working_size(plan.largest_side)
     canvas = make_canvas(options, scan.height, scan.width, working_size, source)
     _check_size(options, output_format, canvas)
     backdrop = open_backdrop(options, scans, plan, canvas, source, folder, listener)
+    contents = read_contents(options)
     key = run_key(
         options,
+        contents,
         recipe=recipe,
         output_format=output_format,
         plans=plans,
@@ -309,6 +318,16 @@ def prepare_run(
         audio=audio,
         chunk_keys=tuple(chunk_key(key, plans, chunk) for chunk in plan.chunks),
         inputs=inputs,
+        record=describe_run(
+            options,
+            contents,
+            recipe=recipe,
+            output_format=output_format,
+            size=canvas.size,
+            plan=plan,
+            inputs=inputs,
+            audio=audio,
+        ),
     )
     inputs.check()
     return prepared

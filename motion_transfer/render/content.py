@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,15 +42,37 @@ KEYED_ELSEWHERE = {
     *("partners", "background"),  # by the cast, and by the file's content
     *("output", "force", "restart", "workers"),  # never change what is drawn
     *("sheet", "audio", "audio_track"),  # made when everything is drawn
+    *("provenance", "credentials_cert", "credentials_key"),  # likewise
 }
 """Options that a run's key need not name. All others are in it: a new one cannot be forgotten."""
 
 
-def source_key(options: SourceOptions, recipe: Recipe) -> str:
-    """Compute the key of a source's appearance. Raises: InputError for a file that is missing."""
+@dataclass(frozen=True)
+class Contents:
+    """What the files hold that a run is made from, besides driver and weights.
+
+    Attributes:
+        pictures: Of each of the cast, see `picture_facts`.
+        background: A word, or the SHA-256 of a file.
+    """
+
+    pictures: tuple[list[tuple[Path, dict[str, Any]]], ...]
+    background: str
+
+
+def read_contents(options: RenderOptions) -> Contents:
+    """Read what the files hold, once. Raises: InputError for one that is missing."""
+    pictures = tuple(picture_facts(member) for member in options.cast)
+    return Contents(pictures, _background_facts(options))
+
+
+def _source_key(
+    options: SourceOptions, pictures: list[tuple[Path, dict[str, Any]]], recipe: Recipe
+) -> str:
+    """Compute the key of a source's appearance."""
     return key_of(
         {
-            "content": [facts for _, facts in picture_facts(options)],
+            "content": [facts for _, facts in pictures],
             "parts": [garment.parts for garment in options.garments],
             "person": options.person,
             "order": options.source_iuv_order,
@@ -81,16 +103,14 @@ def picture_facts(options: SourceOptions) -> list[tuple[Path, dict[str, Any]]]:
 
 def run_key(
     options: RenderOptions,
+    contents: Contents,
     *,
     recipe: Recipe,
     output_format: OutputFormat,
     plans: Sequence[DriverPlan],
     in_place: bool,
 ) -> str:
-    """Compute the key of a run's frames, all but the driver's own.
-
-    Raises: InputError for a file that is missing.
-    """
+    """Compute the key of a run's frames, all but the driver's own."""
     drawn = {
         entry.name: getattr(options, entry.name)
         for entry in list_options(RenderOptions)
@@ -98,8 +118,11 @@ def run_key(
     }
     return key_of(
         {
-            "sources": [source_key(member, recipe) for member in options.cast],
-            "background": _background_facts(options),
+            "sources": [
+                _source_key(member, pictures, recipe)
+                for member, pictures in zip(options.cast, contents.pictures, strict=True)
+            ],
+            "background": contents.background,
             "options": drawn,
             "in place": in_place,
             "thumbnails": options.sheet is not None,
@@ -107,7 +130,7 @@ def run_key(
             "format": [asdict(output_format), options.output.suffix.lower()],
             "shots": [[asdict(shot) for shot in plan.shots] for plan in plans],
             "rate": plans[0].frame_rate,
-            "device": _device(recipe.device),
+            "device": describe_machine(recipe.device),
             "versions": [__version__, *(package_version(name) for name in LIBRARIES)],
         }
     )
@@ -160,8 +183,8 @@ def _estimator_facts(options: EstimatorOptions) -> dict[str, Any]:
     return estimator_facts(options.estimator, options.estimator_model)
 
 
-def _device(name: str) -> list[str]:
-    """Tell what computes: another instruction set may round otherwise."""
+def describe_machine(name: str) -> list[str]:
+    """Tell of a device what computes: another instruction set may round otherwise."""
     if name.startswith("cuda"):
         import torch
 

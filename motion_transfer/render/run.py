@@ -6,7 +6,7 @@ import pickle
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -23,7 +23,8 @@ from motion_transfer.events import (
     Started,
     ignore,
 )
-from motion_transfer.media.output.segments import join_segments, segment_path
+from motion_transfer.media.credentials import sign
+from motion_transfer.media.output.segments import join_segments, read_mark, segment_path
 from motion_transfer.media.pictures.photo import write_png
 from motion_transfer.media.publish import (
     check_destination,
@@ -31,7 +32,7 @@ from motion_transfer.media.publish import (
     publish,
     work_folder,
 )
-from motion_transfer.media.work import WorkFolder, digest_file, key_of, publish_piece, was_published
+from motion_transfer.media.work import WorkFolder, key_of, publish_piece, was_published
 from motion_transfer.render.chunks import PICKLE_PROTOCOL, render
 from motion_transfer.render.composition import Composed, Prepared, compose, read_format
 from motion_transfer.render.crew import Crew, result_of
@@ -39,6 +40,7 @@ from motion_transfer.render.driver import DriverScan
 from motion_transfer.render.engine import ContactSheet, Engine
 from motion_transfer.render.options import OutputOptions, RenderOptions
 from motion_transfer.render.plan import Chunk, describe_missing
+from motion_transfer.render.provenance import mark_with
 
 
 @dataclass(frozen=True)
@@ -152,19 +154,20 @@ def piece_of(prepared: Prepared, chunk: Chunk) -> str:
     return segment_path(Path(), chunk.index, prepared.output_format).name
 
 
-def output_key(prepared: Prepared) -> str:
-    """Compute the key of the whole output. Raises: InputError if its sound is gone."""
-    audio = prepared.audio
+def output_key(options: OutputOptions, prepared: Prepared) -> str:
+    """Compute the key of the whole output."""
     return key_of(
         {
             "chunks": prepared.chunk_keys,
-            "audio": audio and [digest_file(audio.path, "audio"), str(audio)],
+            "audio": prepared.audio,
+            "record": asdict(prepared.record),
+            "told": [options.provenance, options.credentials_cert, options.credentials_key],
         }
     )
 
 
 def assemble(
-    options: OutputOptions, prepared: Prepared, folder: Path, sheet: ContactSheet | None
+    options: RenderOptions, prepared: Prepared, folder: Path, sheet: ContactSheet | None
 ) -> Path:
     """Join the segments in a work folder to an output without its name yet; write the sheet.
 
@@ -176,14 +179,53 @@ def assemble(
         for chunk in prepared.plan.chunks
     ]
     join_segments(
-        segments, finished, prepared.output_format, prepared.plan.frame_rate, prepared.audio
+        segments,
+        finished,
+        prepared.output_format,
+        prepared.plan.frame_rate,
+        prepared.audio,
+        mark_with(prepared.record, full=options.provenance == "full"),
     )
+    if options.credentials_cert is not None and options.credentials_key is not None:
+        finished = _sign(options, finished)
     prepared.inputs.check()
     if sheet is not None and options.sheet is not None:
         with work_folder(options.sheet) as place:
-            write_png(place / "sheet.png", sheet.picture())
+            mark = prepared.output_format.mark
+            write_png(place / "sheet.png", sheet.picture(), mark and mark.xmp())
             publish(place / "sheet.png", options.sheet)
     return finished
+
+
+def _sign(options: RenderOptions, finished: Path) -> Path:
+    """Sign a finished output. Returns: The signed one. Raises: InputError."""
+    mark = read_mark(finished)
+    assert mark and options.credentials_cert and options.credentials_key
+    signed = finished.with_name(f"signed.part-0{finished.suffix}")
+    sign(
+        finished,
+        signed,
+        title=options.output.name,
+        source_type=mark.term,
+        record=mark.record,
+        ingredients=options.source if mark.record else (),
+        certificate=options.credentials_cert,
+        key=options.credentials_key,
+    )
+    finished.unlink()
+    return signed
+
+
+def open_engine(composed: Composed, **more: Any) -> Engine:
+    """Open the engine of a run. Args: more: What else an `Engine` takes. Raises: InputError."""
+    prepared = composed.prepared
+    return Engine(
+        prepared,
+        readers=prepared.open_people(),
+        renderers=[prepared.recipe.renderer(each) for each in composed.appearances],
+        backdrop=prepared.backdrop.open(),
+        **more,
+    )
 
 
 class _ChunkTasks:
@@ -229,7 +271,7 @@ def _render(
     options: RenderOptions, composed: Composed, work: WorkFolder, listener: Listener, crew: Crew
 ) -> None:
     prepared = composed.prepared
-    key = output_key(prepared)
+    key = output_key(options, prepared)
     if work.published(key):
         work.clear()
         return
@@ -257,15 +299,8 @@ def _render(
     chunks = [(chunk, work.temporary(piece_of(prepared, chunk))) for chunk in missing]
     try:
         with explain_disk_errors(options.output):
-            engine = Engine(
-                prepared,
-                readers=prepared.open_people(),
-                renderers=[prepared.recipe.renderer(each) for each in composed.appearances],
-                backdrop=prepared.backdrop.open(),
-                sheet=sheet,
-                listener=listener,
-                helpers=_ChunkTasks(options, composed, work, crew, note),
-            )
+            helpers = _ChunkTasks(options, composed, work, crew, note)
+            engine = open_engine(composed, sheet=sheet, listener=listener, helpers=helpers)
             engine.render(chunks, options.worker_count, finish)
             finished = assemble(options, prepared, work.path, sheet)
             work.publish(finished, key)

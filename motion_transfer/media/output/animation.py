@@ -15,7 +15,11 @@ from motion_transfer.errors import OutputError
 from motion_transfer.media.container import open_output
 from motion_transfer.media.output import video
 from motion_transfer.media.output.formats import OutputFormat
+from motion_transfer.media.output.marks import MakeMark
 from motion_transfer.media.output.segments import Segments, WriteFrame
+from motion_transfer.media.output.whole import digest_output as digest_output
+from motion_transfer.media.output.whole import mark_file
+from motion_transfer.media.output.whole import read_mark as read_mark
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,8 @@ def join_segments(
     destination: Path,
     output_format: OutputFormat,
     rate: Fraction,
-    *_: object,
+    _audio: object = None,
+    mark: MakeMark | None = None,
 ) -> None:
     """Encode segments as an animation that loops; WebP rounds frame times to milliseconds."""
     animation = ANIMATIONS[output_format.kind]
@@ -92,3 +97,4 @@ def join_segments(
         for frame in video.decode_segments(segments, rate):
             output.mux(stream.encode(reformatter.reformat(frame, format=pixels)))
         output.mux(stream.encode(None))
+    mark_file(destination, mark)

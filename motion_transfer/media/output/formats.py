@@ -10,6 +10,7 @@ import av
 
 from motion_transfer.errors import OutputError
 from motion_transfer.media.codecs import CODECS, LOSSLESS, Codec, holds_alpha
+from motion_transfer.media.output.marks import Mark
 
 AlphaMode = Literal["straight", "premultiplied"]
 """Whether colours are as they are, or multiplied by alpha."""
@@ -50,8 +51,8 @@ class OutputKind:
     Attributes:
         suffixes: Endings of its names, lower case; an empty one is a folder's.
         help: The endings, in the words of messages.
-        module: Where its `open_segment` and `join_segments` are, which do what those of `segments`
-            say; it is imported when the first output of this kind is made.
+        module: Where its `open_segment`, `join_segments`, `digest_output` and `read_mark` are,
+            which do what those of `segments` say; it is imported when it is first needed.
         segment_suffix: The ending of a segment's name, where segments are no videos.
         has_sound: Whether it holds sound.
         several: Whether it holds several frames.
@@ -103,6 +104,7 @@ class OutputFormat:
         crf: The constant rate factor; None for a codec without one.
         transparent: Whether frames come as RGBA, not multiplied, and alpha is written.
         premultiplied: Whether colours are written multiplied by alpha.
+        mark: What frames say that are pictures of their own.
     """
 
     kind: str
@@ -111,6 +113,7 @@ class OutputFormat:
     crf: int | None
     transparent: bool = False
     premultiplied: bool = False
+    mark: Mark | None = None
 
     @property
     def row(self) -> OutputKind:
@@ -136,6 +139,12 @@ class OutputFormat:
         return SEGMENT_SUFFIXES[self.codec.segment_container] if suffix is None else suffix
 
 
+def kind_of(output: Path) -> str | None:
+    """Tell the kind of an output by its name's ending; None for one that is none of them."""
+    suffix = output.suffix.lower()
+    return next((kind for kind, row in OUTPUT_KINDS.items() if suffix in row.suffixes), None)
+
+
 def choose_format(
     output: Path,
     *,
@@ -155,7 +164,7 @@ def choose_format(
         FFmpeg lacks, a crf or a pixel format where none applies, or alpha where none can be.
     """
     suffix = output.suffix.lower()
-    kind = next((kind for kind, row in OUTPUT_KINDS.items() if suffix in row.suffixes), None)
+    kind = kind_of(output)
     if kind is None:
         raise OutputError(
             f"cannot write {output}: unknown ending {output.suffix}; supported are"

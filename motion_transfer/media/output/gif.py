@@ -12,15 +12,24 @@ from av.filter import Graph
 from av.filter.context import FilterContext
 
 from motion_transfer.media.container import open_output
+from motion_transfer.media.output.marks import MakeMark
 from motion_transfer.media.output.segments import Segments
 from motion_transfer.media.output.video import decode_segments
 from motion_transfer.media.output.video import open_segment as open_segment
+from motion_transfer.media.output.whole import digest_output as digest_output
+from motion_transfer.media.output.whole import mark_file
+from motion_transfer.media.output.whole import read_mark as read_mark
 
 GIF_TICK = Fraction(1, 100)  # the format counts time in hundredths of a second
 
 
 def join_segments(
-    segments: Segments, destination: Path, _format: object, rate: Fraction, *_: object
+    segments: Segments,
+    destination: Path,
+    _format: object,
+    rate: Fraction,
+    _audio: object = None,
+    mark: MakeMark | None = None,
 ) -> None:
     """Encode segments as a looping GIF; frame times are rounded to the format's hundredths."""
     palette = _find_palette(segments, rate)
@@ -46,6 +55,7 @@ def join_segments(
         pictures.push(None)
         _drain(sink, stream, output)
         output.mux(stream.encode(None))
+    mark_file(destination, mark)
 
 
 def _drain(sink: FilterContext, stream: av.VideoStream, output: OutputContainer) -> None:

@@ -21,6 +21,7 @@ from motion_transfer.media.alpha import add_alpha, lay_on_white
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.pictures.colours import ProfileError, convert_lab, convert_to_srgb
 from motion_transfer.media.pictures.png import SIGNATURE, find_png_fault
+from motion_transfer.media.pictures.xmp import put_xmp
 from motion_transfer.media.quiet import quiet_libraries
 
 HEIF_BRANDS = set(b"heic heix heim heis hevc hevx hevm hevs mif1 msf1".split())
@@ -240,13 +241,18 @@ def _with_8_bits(file: Image.Image) -> Image.Image:
     return image
 
 
-def write_png(path: Path, pixels: UInt8[np.ndarray, "H W C"] | UInt8[np.ndarray, "H W"]) -> None:
-    """Write a picture, RGB, RGBA or grey, as PNG. Raises: OSError."""
+def write_png(
+    path: Path,
+    pixels: UInt8[np.ndarray, "H W C"] | UInt8[np.ndarray, "H W"],
+    xmp: bytes | None = None,
+) -> None:
+    """Write a picture, RGB, RGBA or grey, as PNG, with XMP if there is any. Raises: OSError."""
     order = [2, 1, 0, 3][: pixels.shape[-1]]  # OpenCV's
     ok, encoded = cv2.imencode(".png", pixels[..., order] if pixels.ndim == 3 else pixels)
     if not ok:
         raise OSError(f"cannot encode a PNG of {pixels.shape}")
-    path.write_bytes(encoded.tobytes())
+    data = encoded.tobytes()
+    path.write_bytes(data if xmp is None else put_xmp(data, xmp))
 
 
 def encode_png(

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from motion_transfer.errors import InputError
 from motion_transfer.option import REQUIRED, option
 from motion_transfer.render.options.part import Part
 
 NO_AUDIO = "none"
 SIZES = ("driver", "crop", "even", "background")
 ALPHAS = ("straight", "premultiplied")
+PROVENANCE = ("full", "mark")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +87,29 @@ class OutputOptions(Part):
     sheet: Path | None = option(
         "--sheet", "Output", "Write a contact sheet (PNG) there as well.", kind="path"
     )
+    provenance: str = option(
+        "--provenance",
+        "Output",
+        "What the output says of itself: full (default), what it was made of and by, for `mt"
+        " verify`; or mark, only that it is synthetic.",
+        default="full",
+        choices=PROVENANCE,
+    )
+    credentials_cert: Path | None = option(
+        "--credentials-cert",
+        "Output",
+        "Sign the output with this certificate (PEM, those of its issuers below it), as Content"
+        " Credentials (C2PA).",
+        kind="path",
+        metavar="FILE",
+    )
+    credentials_key: Path | None = option(
+        "--credentials-key",
+        "Output",
+        "The certificate's private key (PEM).",
+        kind="path",
+        metavar="FILE",
+    )
     force: bool = option(
         "--force", "Output", "Replace an existing output.", kind="flag", default=False
     )
@@ -96,3 +121,8 @@ class OutputOptions(Part):
         default=False,
         in_manifest=False,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.credentials_cert is None) != (self.credentials_key is None):
+            raise InputError("--credentials-cert and --credentials-key sign together; give both")
