@@ -48,7 +48,9 @@ def _layout(facts: dict[str, Any], indent: str = "") -> str:
         if isinstance(value, dict):
             lines += [f"{indent}{key}", _layout(value, indent + "  ")]
         else:
-            listed = ", ".join(map(str, value)) if isinstance(value, list) else value
+            listed = ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
+            if value is None or isinstance(value, bool):
+                listed = "none" if value is None else "yes" if value else "no"
             lines.append(f"{indent}{key!s:<{width}}  {listed}")
     return "\n".join(lines)
 
