@@ -29,6 +29,7 @@ from nhrr_core import VARIANTS, NeuralReRenderer
 
 SIDE = 128
 PROTOCOLS = ("people", FREE_PEOPLE)
+METRICS = ("ssim", "psnr", "efficientnet-lite0", "hidden")
 SETTINGS = {
     "model.alpha": "true",
     "losses.identity": "none",
@@ -63,7 +64,7 @@ def main() -> None:
     for protocol in PROTOCOLS if arguments.assets else PROTOCOLS[:1]:
         call(
             *("eval", "--protocol", protocol, "--limit", arguments.pairs),
-            *("--size", f"{SIDE}x{SIDE}"),
+            *("--size", f"{SIDE}x{SIDE}", "--metrics", ",".join(METRICS)),
             *(("--assets", arguments.assets) if protocol == FREE_PEOPLE else ()),
             *(word for path in weights for word in ("--weights", path)),
             *("--renderer", "texture"),
