@@ -9,7 +9,7 @@ ifneq ($(wildcard ../shared/data),)
 export MT_SAMPLES ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo test fuzz lint check schema lock clean
+.PHONY: demo test docs fuzz lint check schema lock clean
 
 demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion, then one without IUV
 	$(BIN)/mt demo --output demo.mp4 --force
@@ -18,6 +18,9 @@ demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion, t
 
 test: $(VENV)/.installed-dev  ## run the tests
 	$(BIN)/python -m pytest --numprocesses auto
+
+docs: $(VENV)/.installed-dev  ## the documentation as a site, in build/site: a broken link is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --config-file tools/docs/mkdocs.yml
 
 FUZZ_SECONDS ?= 600
 

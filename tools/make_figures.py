@@ -1,6 +1,6 @@
-"""Make the README's pictures: `python tools/make_figures.py ASSETS` (needs the `people` extra).
+"""Make the documentation's pictures: `python tools/make_figures.py ASSETS` (extra `people`).
 
-`docs/demo.png`: the demo's photo, and its motion over the result at six moments.
+`docs/demo.webp`: what `mt demo --compare` makes, moving.
 `docs/how_it_works.png`: what each step of the method hands to the next.
 `docs/people.jpg`: synthetic people with their IUV, half of them in MakeHuman's assets, whose folder
 is named.
@@ -9,6 +9,7 @@ is named.
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 from threading import Event
@@ -21,7 +22,6 @@ from motion_transfer.drawing.canvas import colour_iuv, paste
 from motion_transfer.drawing.window import Window
 from motion_transfer.events import ignore
 from motion_transfer.media.iuv.opening import open_reader, open_stream
-from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.people import PeopleStream
 from motion_transfer.preview.driver import PreviewedDriver, plan_frames
 from motion_transfer.preview.views import Views
@@ -32,7 +32,7 @@ from motion_transfer.render.source import read_source
 
 ROOT = Path(__file__).parents[1]
 DEMO = ROOT / "motion_transfer" / "demo"
-MOMENTS = (0, 24, 40, 56, 72, 104)
+MOMENT = 24
 WAVING = (0, 10, 20)
 PEOPLE_SEED, PEOPLE_ROWS, PEOPLE_COLUMNS = 3, 6, 4
 PANEL_PX = 240
@@ -48,29 +48,14 @@ def main(assets: Path) -> None:
     feature_map = recipe.appearance_of(source)
     reader = open_reader(open_stream(options.driver))
     renderer = recipe.renderer(feature_map)
-    targets = [next(iter(reader.read(moment, moment + 1))) for moment in MOMENTS]
-    results = []
-    for iuv in targets:
-        frame = np.full_like(iuv, 255)
-        window = Window(0, 0, iuv.shape[0])
-        crop = window.cut(iuv, renderer.working_size(window.side))
-        paste(frame, renderer.render(crop[None])[0], window)
-        results.append(frame)
+    target = next(iter(reader.read(MOMENT, MOMENT + 1)))
+    result = np.full_like(target, 255)
+    window = Window(0, 0, target.shape[0])
+    crop = window.cut(target, renderer.working_size(window.side))
+    paste(result, renderer.render(crop[None])[0], window)
 
-    cut = [np.s_[:, 35:285]] * len(targets)
-    rows = [
-        np.hstack([colour_iuv(iuv)[c] for iuv, c in zip(targets, cut, strict=True)]),
-        np.hstack([frame[c] for frame, c in zip(results, cut, strict=True)]),
-    ]
-    photo = read_photo(options.source).rgb
-    height = 2 * rows[0].shape[0]
-    photo = cv2.resize(
-        photo,
-        (round(photo.shape[1] * height / photo.shape[0]), height),
-        interpolation=cv2.INTER_AREA,
-    )
-    save(ROOT / "docs" / "demo.png", np.hstack([photo, np.vstack(rows)]))
-
+    demo = [sys.executable, "-m", "motion_transfer", "demo", "--compare", "--force", "--output"]
+    subprocess.run([*demo, str(ROOT / "docs" / "demo.webp")], check=True)
     save(ROOT / "docs" / "people.jpg", people_sheet(assets))
     save(ROOT / "docs" / "astronaut.jpg", photo_alone())
 
@@ -83,8 +68,8 @@ def main(assets: Path) -> None:
                 panel(colour_iuv(source.iuv), "its IUV"),
                 panel(partial.astype(np.uint8), "partial texture: what is seen"),
                 panel(picture(feature_map[0, :3]), "feature map (3 of 16), once"),
-                panel(colour_iuv(targets[1]), "target IUV, per frame"),
-                panel(results[1], "frame"),
+                panel(colour_iuv(target), "target IUV, per frame"),
+                panel(result, "frame"),
             ]
         ),
     )
