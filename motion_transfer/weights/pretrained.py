@@ -14,7 +14,7 @@ from pathlib import Path
 from motion_transfer.errors import FetchError, InputError, WeightsError, first_line
 from motion_transfer.extras import require_extra
 from motion_transfer.media.publish import check_destination, publish, work_folder
-from motion_transfer.media.structured import read_structured
+from motion_transfer.media.structured import parse_json, read_text
 from motion_transfer.weights.card import write_card
 from motion_transfer.weights.checkpoint import FORMAT, inspect_checkpoint
 
@@ -59,7 +59,7 @@ def check_folder(folder: Path) -> Path:
         )
     if (beside := folder / CONFIG).is_file():
         try:
-            told = read_structured(beside, "configuration")
+            told = parse_json(read_text(beside, "configuration"), str(beside))
         except InputError as error:
             raise WeightsError(str(error)) from None
         own = inspect_checkpoint(path).config.to_dict()

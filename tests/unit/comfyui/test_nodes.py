@@ -23,7 +23,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.render.memory import MotionTransfer
 
 HERE = Path(comfyui.__path__[0])
-WORKFLOW = HERE / "example_workflows" / "dance.json"
+WORKFLOW = HERE / "workflows" / "dance.json"
 
 
 @pytest.fixture
