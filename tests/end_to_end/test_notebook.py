@@ -13,7 +13,7 @@ pytest.importorskip("ipykernel", reason="needs ipykernel, of the `dev` extra")
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOK = ROOT / "docs" / "notebook.ipynb"
-LONGEST_SECONDS = 600  # of a cell; all take about a minute, alone on two cores
+LONGEST_SECONDS = 600  # of a cell; together they take less than a minute of one core
 
 
 def test_it_is_kept_without_outputs() -> None:
