@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 from motion_transfer.events import Listener, ignore
 from motion_transfer.media.iuv.formats import ChannelOrder, DriverKind, Missing
 from motion_transfer.option import parse_frames, parse_rate
+from motion_transfer.render.memory import AnyPath, list_paths
 from motion_transfer.render.options import Garment, Partner, RenderOptions
 from motion_transfer.render.run import RenderReport, run
-
-AnyPath = str | PathLike[str]
 
 
 def render_video(
@@ -37,7 +35,7 @@ def render_video(
     fit_body: bool = False,
     renderer: str = "nhrr",
     weights: AnyPath | None = None,
-    background: str | PathLike[str] = "white",
+    background: AnyPath = "white",
     background_fit: Literal["cover", "contain", "stretch"] = "cover",
     background_end: Literal["loop", "hold", "cut"] = "loop",
     background_blur: float = 0.0,
@@ -93,7 +91,7 @@ def render_video(
         estimator_model: DensePose's file.
         fit_body: Give the driver's body the proportions of the source's.
         renderer: `nhrr` (the network) or `texture` (a draft without it).
-        weights: Checkpoint of the network; else the one that ships.
+        weights: Checkpoint of the network, or `hf:owner/name`; else the one that ships.
         background: `white`, `black`, `#rrggbb`, `transparent`, a picture or a video; `photo` (the
             source's, without its person) or `driver` (the driver's pictures, likewise).
         background_fit: How a picture behind fills the frame.
@@ -135,8 +133,8 @@ def render_video(
     """
     return run(
         RenderOptions(
-            source=_paths(source),
-            source_iuv=_paths(source_iuv),
+            source=list_paths(source),
+            source_iuv=list_paths(source_iuv),
             person=person,
             source_iuv_order=source_iuv_order,
             garments=tuple(garments),
@@ -185,12 +183,6 @@ def render_video(
         ),
         listener,
     )
-
-
-def _paths(paths: AnyPath | Sequence[AnyPath] | None) -> tuple[Path, ...]:
-    if paths is None:
-        return ()
-    return (Path(paths),) if isinstance(paths, str | PathLike) else tuple(map(Path, paths))
 
 
 def _path(path: AnyPath | None) -> Path | None:

@@ -28,7 +28,7 @@ from motion_transfer.media.structured import shown
 from motion_transfer.option import list_options, parse_background
 from motion_transfer.render.inputs import audio_files, driver_files
 from motion_transfer.render.options import NO_AUDIO, RenderOptions
-from motion_transfer.weights import SHIPPED, find_weights
+from motion_transfer.weights import find_weights, names_weights_file
 
 OPTIONS = {entry.word: entry for entry in list_options(RenderOptions)}
 MAY_BE_FOLDERS = ("source", "driver", "partner", "background")
@@ -205,7 +205,9 @@ class _Spread:
         return OPTIONS[word].read(value)
 
     def _laid(self, word: str, value: str) -> Path:
-        named = (word, value) == ("audio", NO_AUDIO) or (word == "weights" and value in SHIPPED)
+        named = (word, value) == ("audio", NO_AUDIO) or (
+            word == "weights" and not names_weights_file(value)
+        )
         fixed = named or value.startswith("/") or not _names_file(value)
         return _path(value if fixed else f"{self._folder}/{value}")
 

@@ -321,6 +321,18 @@ def read_person(
     iuv = read_single_iuv(path, order, f"{what} IUV")
     if iuv is None:
         raise InputError(f"{where}: no person in it, every pixel is background")
+    return take_person(photo, iuv, choice, where)
+
+
+def take_person(
+    photo: Photo, iuv: UInt8[np.ndarray, "H W 3"], choice: str, where: str
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Leave one person in a photo's IUV, see `read_person`.
+
+    Args:
+        where: The IUV, for messages.
+    Raises: InputError if it is of another size, or shows nobody whom the choice means.
+    """
     if iuv.shape[:2] != photo.rgb.shape[:2]:
         height, width = photo.rgb.shape[:2]
         hint = "make the IUV from this very photo"

@@ -12,19 +12,22 @@ if TYPE_CHECKING:
     from motion_transfer.estimate.blazepose import BlazePoseEstimator
     from motion_transfer.estimate.clip import ClipSummary, estimate_clip
     from motion_transfer.estimate.densepose import DensePoseEstimator
+    from motion_transfer.estimate.frames import estimate_frames
     from motion_transfer.estimate.interface import Estimator, Landmarks, PersonEstimate
     from motion_transfer.estimate.opening import open_estimator
     from motion_transfer.estimate.run import EstimateOptions, EstimateReport, estimate_iuv
 
 __all__ = [
     "BlazePoseEstimator", "ClipSummary", "DensePoseEstimator", "EstimateOptions", "EstimateReport",
-    "Estimator", "Landmarks", "PersonEstimate", "estimate_clip", "estimate_iuv", "open_estimator",
+    "Estimator", "Landmarks", "PersonEstimate", "estimate_clip", "estimate_frames", "estimate_iuv",
+    "open_estimator",
 ]  # fmt: skip
 
 _NAMES_OF = {
     "blazepose": "BlazePoseEstimator",
     "clip": "ClipSummary estimate_clip",
     "densepose": "DensePoseEstimator",
+    "frames": "estimate_frames",
     "interface": "Estimator Landmarks PersonEstimate",
     "opening": "open_estimator",
     "run": "EstimateOptions EstimateReport estimate_iuv",

@@ -38,7 +38,7 @@ from motion_transfer.media.publish import publish
 from motion_transfer.media.unchanged import status_key
 from motion_transfer.media.work import key_of
 from motion_transfer.option import SCENES
-from motion_transfer.render.driver import DriverFile, DriverScan
+from motion_transfer.render.driver import DriverIuv, DriverScan
 from motion_transfer.render.options.scene import SceneOptions
 from motion_transfer.render.plan import DriverPlan
 
@@ -140,7 +140,7 @@ class DriverPictures:
     """
 
     path: Path
-    people: tuple[DriverFile, ...]
+    people: tuple[DriverIuv, ...]
     first: int
     plates: tuple[tuple[int, Path | None], ...]
     size: tuple[int, int]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from motion_transfer.media.iuv.stream import IuvReader
     from motion_transfer.render.backdrop import OpenBackdrop
     from motion_transfer.render.composition import Prepared
-    from motion_transfer.render.driver import DriverFile
+    from motion_transfer.render.driver import DriverIuv
     from motion_transfer.render.plan import Chunk, FrameReader
 
 KEPT_FRAMES_BYTES = 256 << 20
@@ -62,7 +62,7 @@ def render(
     )
     backdrop: OpenBackdrop = WARM.get(f"backdrop {name}", run.backdrop.open)
     files = dict.fromkeys(actor.driver for actor in run.actors)
-    readers: dict[DriverFile, FrameReader] = {
+    readers: dict[DriverIuv, FrameReader] = {
         file: WARM.get(f"reader {file}", file.open) for file in files
     }
     if keep_frames and len(files) == 1:
@@ -89,7 +89,7 @@ def render(
 class _SharedFrames:
     """A reader that keeps a chunk's frames, so that jobs that share a driver share its decoding."""
 
-    def __init__(self, reader: IuvReader, file: DriverFile) -> None:
+    def __init__(self, reader: IuvReader, file: DriverIuv) -> None:
         self._reader = reader
         self._file = file
         self.stream = reader.stream

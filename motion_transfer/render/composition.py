@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from motion_transfer.drawing.canvas import Canvas
@@ -51,15 +51,12 @@ from motion_transfer.render.source import check_photos, read_source
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """A run that can be rendered chunk by chunk, in any process.
+class Scene:
+    """All that frames are drawn from, but the appearances of those who are in them.
 
     Attributes:
         actors: Everybody who is drawn; the first one leads.
         crops: Whether the output is the square that was drawn, and no frame of the driver.
-        chunk_keys: Of the content that each chunk is made from.
-        inputs: All files that it is made from.
-        record: What the output says of itself.
     """
 
     actors: tuple[Actor, ...]
@@ -67,11 +64,6 @@ class Prepared:
     recipe: Recipe
     canvas: Canvas
     backdrop: Backdrop
-    output_format: OutputFormat
-    audio: AudioCut | None
-    chunk_keys: tuple[str, ...]
-    inputs: Inputs
-    record: Record
 
     @property
     def plan(self) -> DriverPlan:
@@ -82,6 +74,23 @@ class Prepared:
         """Open the IUV of each actor, once for those who share it. Raises: InputError."""
         readers = {actor.driver: actor.driver.open() for actor in self.actors}
         return [readers[actor.driver] for actor in self.actors]
+
+
+@dataclass(frozen=True)
+class Prepared(Scene):
+    """A run that can be rendered chunk by chunk, in any process.
+
+    Attributes:
+        chunk_keys: Of the content that each chunk is made from.
+        inputs: All files that it is made from.
+        record: What the output says of itself.
+    """
+
+    output_format: OutputFormat
+    audio: AudioCut | None
+    chunk_keys: tuple[str, ...]
+    inputs: Inputs
+    record: Record
 
 
 @dataclass(frozen=True)
@@ -283,12 +292,10 @@ def prepare_run(
         inputs |= each.inputs
     output_format = replace(read_format(options), mark=Mark(source_type_of(options)))
     _check_length(options, output_format, plan)
-    recipe.make_ready([shot.window.side for plan in plans for shot in plan.shots])
-    working_size = recipe.working_size(plan.largest_side)
-    canvas = make_canvas(options, scan.height, scan.width, working_size, source)
+    canvas = open_canvas(options, scans, plans, recipe, source)
     _check_size(options, output_format, canvas)
-    backdrop = open_backdrop(options, scans, plan, canvas, source, folder, listener)
     contents = read_contents(options)
+    scene = set_scene(options, scans, plans, recipe, sources, canvas, folder, listener)
     key = run_key(
         options,
         contents,
@@ -309,11 +316,7 @@ def prepare_run(
     for note in audio.notes if audio else ():
         listener(Notice(note))
     prepared = Prepared(
-        actors=make_actors(options, scans, plans, sources, canvas, backdrop),
-        crops=options.size == "crop",
-        recipe=recipe,
-        canvas=canvas,
-        backdrop=backdrop,
+        **{each.name: getattr(scene, each.name) for each in fields(scene)},
         output_format=output_format,
         audio=audio,
         chunk_keys=tuple(chunk_key(key, plans, chunk) for chunk in plan.chunks),
@@ -331,6 +334,40 @@ def prepare_run(
     )
     inputs.check()
     return prepared
+
+
+def open_canvas(
+    options: RenderOptions,
+    scans: Sequence[DriverScan],
+    plans: Sequence[DriverPlan],
+    recipe: Recipe,
+    source: Source,
+) -> Canvas:
+    """Make the empty output, see `make_canvas`; what draws is loaded. Raises: InputError."""
+    recipe.make_ready([shot.window.side for plan in plans for shot in plan.shots])
+    working_size = recipe.working_size(plans[0].largest_side)
+    return make_canvas(options, scans[0].height, scans[0].width, working_size, source)
+
+
+def set_scene(
+    options: RenderOptions,
+    scans: Sequence[DriverScan],
+    plans: Sequence[DriverPlan],
+    recipe: Recipe,
+    sources: Sequence[Source],
+    canvas: Canvas,
+    folder: Path,
+    listener: Listener,
+) -> Scene:
+    """Lay out what is behind, and everybody before it, see `prepare_run`. Raises: InputError."""
+    backdrop = open_backdrop(options, scans, plans[0], canvas, sources[0], folder, listener)
+    return Scene(
+        actors=make_actors(options, scans, plans, sources, canvas, backdrop),
+        crops=options.size == "crop",
+        recipe=recipe,
+        canvas=canvas,
+        backdrop=backdrop,
+    )
 
 
 def _check_length(options: OutputOptions, output_format: OutputFormat, plan: DriverPlan) -> None:

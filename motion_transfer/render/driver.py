@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from jaxtyping import UInt8
@@ -37,9 +37,17 @@ if TYPE_CHECKING:
     from motion_transfer.render.picture_driver import PictureDriver
 
 
+class DriverIuv(Protocol):
+    """A driver's IUV, wherever it is; equal ones are opened once."""
+
+    def open(self) -> IuvReader:
+        """Open it. Raises: InputError if it is gone, IuvFileError if it is not IUV."""
+        ...
+
+
 @dataclass(frozen=True)
 class DriverFile:
-    """A driver's IUV, which any process can open for itself.
+    """A driver's IUV in a file, which any process can open for itself.
 
     Attributes:
         missing: What a number missing from a folder does.
@@ -50,7 +58,6 @@ class DriverFile:
     order: ChannelOrder
 
     def open(self) -> IuvReader:
-        """Open it. Raises: InputError if it is gone, IuvFileError if it is not IUV."""
         return open_reader(open_stream(self.path, missing=self.missing), self.order)
 
 
@@ -67,7 +74,7 @@ class Driver:
     """
 
     path: Path
-    file: DriverFile
+    file: DriverIuv
     reader: IuvReader
     frame_rate: Fraction | None
     inputs: Inputs
@@ -122,7 +129,7 @@ class DriverScan:
     """
 
     path: Path
-    file: DriverFile
+    file: DriverIuv
     height: int
     width: int
     frame_rate: Fraction | None
@@ -216,7 +223,7 @@ def scan_driver(
     return driver.scan_of(chosen, seen)
 
 
-def _look(file: DriverFile, frames: range, as_one: bool) -> list[SeenFrame]:
+def _look(file: DriverIuv, frames: range, as_one: bool) -> list[SeenFrame]:
     """Look through a stretch of a driver in another process, see `Driver.people_in`."""
     reader = WARM.get(f"reader {file}", file.open)
     return look_through(reader, frames, take_as_one if as_one else find_people)

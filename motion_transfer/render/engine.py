@@ -1,19 +1,12 @@
 """The engine: chunks of a driver, rendered by threads, each to its own segment.
 
-A thread takes a chunk from decoding to encoding. Where a picture takes long, other threads draw it,
-a batch each, while the chunks' threads decode and encode. Few batches are on their way at a time:
-memory is bounded by the number of threads, not by the length of the driver.
+A thread takes a chunk from decoding to encoding; others may draw for it, see `frames`.
 """
 
 from __future__ import annotations
 
-import threading
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
-from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -21,20 +14,15 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from motion_transfer.drawing.backgrounds import Frame
-from motion_transfer.drawing.canvas import Figure, Picture, Rgba, show_alpha
-from motion_transfer.drawing.engines.interface import LANES
-from motion_transfer.drawing.engines.threads import one_torch_thread
+from motion_transfer.drawing.canvas import Picture, show_alpha
 from motion_transfer.drawing.renderers.interface import Renderer
-from motion_transfer.drawing.window import Window
-from motion_transfer.errors import InputError, RenderError
 from motion_transfer.events import FramesDone, Listener, ignore
 from motion_transfer.media.output.segments import open_segment
 from motion_transfer.media.pictures.photo import read_photo, write_png
 from motion_transfer.render.backdrop import OpenBackdrop
 from motion_transfer.render.composition import Prepared
-from motion_transfer.render.plan import Chunk, FrameReader, digest_of_iuv
-from motion_transfer.render.scene import Actor
+from motion_transfer.render.frames import FrameDrawer, StoppedError
+from motion_transfer.render.plan import Chunk, FrameReader
 
 CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's batches are on the way
 
@@ -42,12 +30,6 @@ STOP_SECONDS = 0.2  # how soon a thread that waits for another process heeds a s
 
 SHEET_FRAMES, SHEET_COLUMNS = 12, 4
 THUMBNAIL_PX = 320  # the longer side: twelve of them fit a screen
-
-Pixels = UInt8[np.ndarray, "B S S 4"]
-
-
-class StoppedError(Exception):
-    """A thread gives up its chunk because the run is being stopped."""
 
 
 class Helpers(Protocol):
@@ -78,17 +60,12 @@ class Engine:
     ) -> None:
         """Take what was prepared; of readers and renderers there is one for each actor."""
         self._prepared = prepared
-        self._plan = prepared.plan
-        self._roles = [
-            _Role(*each) for each in zip(prepared.actors, readers, renderers, strict=True)
-        ]
-        self._backdrop = backdrop
+        self._drawer = FrameDrawer(
+            prepared, readers=readers, renderers=renderers, backdrop=backdrop
+        )
         self._sheet = sheet
         self._listener = listener
         self._helpers = helpers
-        self._drawers: ThreadPoolExecutor | None = None
-        self._ahead = 0  # batches of a chunk on their way, beyond the one that is wanted next
-        self._stop = threading.Event()
 
     def render(
         self,
@@ -103,16 +80,12 @@ class Engine:
         Raises: the first thread's error, after all threads have stopped; InputError if the run's
             inputs change meanwhile.
         """
-        drawers = {"core": threads, "device": LANES, "nothing": 0}[self._roles[0].renderer.occupies]
         with (
-            one_torch_thread(),
-            ThreadPoolExecutor(max(1, drawers), thread_name_prefix="draw") as draw,
+            self._drawer.at_work(threads) as drawers,
             ThreadPoolExecutor(
                 CHUNKS_AT_ONCE if drawers else threads, thread_name_prefix="chunk"
             ) as pool,
         ):
-            if drawers:
-                self._drawers, self._ahead = draw, drawers
             futures = [
                 pool.submit(self._render_chunk, chunk, path, finished) for chunk, path in chunks
             ]
@@ -121,8 +94,7 @@ class Engine:
                 for future in done:
                     future.result()
             except BaseException:
-                self._stop.set()
-                draw.shutdown(wait=True, cancel_futures=True)
+                self._drawer.stop()
                 pool.shutdown(wait=True, cancel_futures=True)
                 raise
 
@@ -131,7 +103,7 @@ class Engine:
     ) -> None:
         if self._helpers is not None and (future := self._helpers.begin(chunk)) is not None:
             while wait([future], timeout=STOP_SECONDS).not_done:
-                if self._stop.is_set():
+                if self._drawer.stopped:
                     raise StoppedError
             self._helpers.finish(chunk, future)
             self._listener(FramesDone(chunk.stop - chunk.start))
@@ -140,111 +112,16 @@ class Engine:
             path,
             self._prepared.output_format,
             size=self._prepared.canvas.size,
-            rate=self._plan.frame_rate,
+            rate=self._prepared.plan.frame_rate,
             first=chunk.start,
         ) as write:
-            for index, frame in enumerate(self._lay_out(chunk), chunk.start):
+            for index, frame in enumerate(self._drawer.frames(chunk), chunk.start):
                 write(frame)
                 if self._sheet is not None:
                     self._sheet.offer(index, frame)
                 self._listener(FramesDone(1))
         finished(chunk, path)
         self._prepared.inputs.glance()
-
-    def _lay_out(self, chunk: Chunk) -> Iterator[Picture]:
-        """Make a chunk's output frames."""
-        canvas = self._prepared.canvas
-        drawn = zip(*(self._draw(role, chunk) for role in self._roles), strict=True)
-        behind = self._backdrop.read(chunk.start, chunk.stop)
-        for index, (background, figures) in enumerate(zip(behind, drawn, strict=True), chunk.start):
-            people = [
-                Figure(rgba, role.actor.spots[index], role.actor.table)
-                for role, (_, rgba) in zip(self._roles, figures, strict=True)
-            ]
-            yield canvas.lay_out(background, people, figures[0][0])
-
-    def _draw(self, role: _Role, chunk: Chunk) -> Iterator[tuple[Frame, Rgba]]:
-        """Draw an actor frame by frame; batches begin where chunk or shot does.
-
-        Returns: With each picture the IUV to compare it with: the driver's, or the square that was
-            drawn, where that is the output.
-        """
-        frames = self._read(role, chunk)
-        on_their_way: deque[Callable[[], list[tuple[Frame, Rgba]]]] = deque()
-        renderer = role.renderer
-        for shot in role.actor.plan.shots_in(chunk):
-            size = renderer.batch_size(renderer.working_size(shot.window.side))
-            for start in range(shot.start, shot.stop, size):
-                count = min(size, shot.stop - start)
-                batch = list(islice(frames, count))
-                on_their_way.append(self._begin_batch(role, batch, start, shot.window))
-                if len(on_their_way) > self._ahead:
-                    yield from on_their_way.popleft()()
-                if self._stop.is_set():
-                    raise StoppedError
-        for finish in on_their_way:
-            yield from finish()
-
-    def _begin_batch(
-        self, role: _Role, batch: list[Frame], start: int, window: Window
-    ) -> Callable[[], list[tuple[Frame, Rgba]]]:
-        """Have driver frames drawn, which make frames from `start` on; give what waits for it."""
-        renderer = role.renderer
-        size = renderer.working_size(window.side)
-        # padded to full batches: what one frame looks like must not depend on its neighbours
-        crops = np.zeros((renderer.batch_size(size), size, size, 3), np.uint8)
-        for slot, iuv in enumerate(batch):
-            crops[slot] = window.cut(iuv, size)
-        drawn = partial(renderer.render, crops)
-        if self._drawers is not None:
-            drawn = self._drawers.submit(drawn).result
-        shown = list(crops) if self._prepared.crops else batch
-        return partial(_finish_batch, role, shown[: len(batch)], start, drawn)
-
-    def _read(self, role: _Role, chunk: Chunk) -> Iterator[Frame]:
-        """Read the IUV frames that the chunk shows, with only the followed person in them."""
-        reader, plan = role.reader, role.actor.plan
-        first = plan.first
-        frames = reader.read(first + chunk.start, first + chunk.stop)
-        entries = plan.frames[chunk.start : chunk.stop]
-        shown_index, shown = -1, None
-        for index, (entry, iuv) in enumerate(
-            zip(entries, frames, strict=True), first + chunk.start
-        ):
-            if entry.held is None:
-                shown_index, shown = index, iuv
-            elif entry.held != shown_index or shown is None:
-                shown_index, shown = entry.held, next(reader.read(entry.held, entry.held + 1))
-            if digest_of_iuv(shown) != entry.digest:
-                raise InputError(
-                    f"{reader.stream.where(shown_index)} has changed since the run began;"
-                    " start again when it is complete"
-                )
-            yield entry.isolate(shown)
-
-
-@dataclass(frozen=True)
-class _Role:
-    """An actor, and what reads and draws for it."""
-
-    actor: Actor
-    reader: FrameReader
-    renderer: Renderer
-
-
-def _finish_batch(
-    role: _Role, shown: Sequence[Frame], start: int, drawn: Callable[[], Pixels]
-) -> list[tuple[Frame, Rgba]]:
-    """Wait for a batch."""
-    try:
-        results = drawn()
-    except RuntimeError as error:  # what torch raises, out of memory too
-        first = role.actor.plan.first + start
-        raise RenderError(
-            f"the {role.renderer.name} renderer failed in the driver's frames {first} to"
-            f" {first + len(shown) - 1}: {error}"
-        ) from error
-    return list(zip(shown, results, strict=False))
 
 
 class ContactSheet:

@@ -24,7 +24,7 @@ from motion_transfer.render.backdrop import (
     open_background,
     open_still,
 )
-from motion_transfer.render.driver import DriverFile, DriverScan
+from motion_transfer.render.driver import DriverIuv, DriverScan
 from motion_transfer.render.options import RenderOptions
 from motion_transfer.render.placing import place_in_square, place_people
 from motion_transfer.render.plan import DriverPlan
@@ -39,7 +39,7 @@ class Actor:
         table: Changes the light of what is drawn, see `match_light`.
     """
 
-    driver: DriverFile
+    driver: DriverIuv
     plan: DriverPlan
     spots: tuple[Spot, ...]
     table: np.ndarray | None = None

@@ -54,13 +54,18 @@ def read_sources(
         for number, garment in enumerate(options.garments)
     ]
     sources = [dress(person, garments) for person in people]
-    share = float(sources[0].visibility.mean())
+    check_visible(sources[0], options.source_words)
+    return sources
+
+
+def check_visible(source: Source, name: str) -> None:
+    """Raise InputError, naming the source, if it shows hardly anything of the body."""
+    share = float(source.visibility.mean())
     if share < SMALLEST_VISIBLE_SHARE:
         raise InputError(
-            f"source {options.source_words} shows too little of the body ({share:.1%} of the"
-            " texture); use a larger photo, or choose another --person"
+            f"source {name} shows too little of the body ({share:.1%} of the texture); use a larger"
+            " photo, or choose another --person"
         )
-    return sources
 
 
 def _read_garment(

@@ -113,7 +113,7 @@ def find_person(
         iuv = read_person(photo, iuv_path, choice, options.source_iuv_order, what)
         return FoundPicture(SourcePicture(photo, iuv, parts=parts), iuv_path)
     person = estimate_person(photo, choice, options, what)
-    return FoundPicture(_show_estimate(photo, person, parts))
+    return FoundPicture(show_estimate(photo, person, parts))
 
 
 def estimate_person(
@@ -126,8 +126,10 @@ def estimate_person(
         what: The photo's role, for messages.
     Raises: InputError if nobody is found, or what it takes to look is missing.
     """
-    names = " nor ".join(path.name for path in list_iuv_names(photo.path))
-    lacking = f"no IUV found for {photo.path} (neither {names} is beside it)"
+    lacking = f"{photo.path} comes without IUV"
+    if photo.path.exists():
+        names = " nor ".join(path.name for path in list_iuv_names(photo.path))
+        lacking = f"no IUV found for {photo.path} (neither {names} is beside it)"
     try:
         estimator = open_estimator(options.estimator, options.estimator_model)
     except InputError as error:
@@ -142,9 +144,10 @@ def estimate_person(
     return chosen[0]
 
 
-def _show_estimate(
+def show_estimate(
     photo: Photo, person: PersonEstimate, parts: tuple[int, ...] = ALL_PARTS
 ) -> SourcePicture:
+    """Take a photo with what an estimator found in it."""
     iuv, alpha = person.on_frame(*photo.rgb.shape[:2])
     if photo.alpha is not None:
         alpha = np.minimum(alpha, photo.alpha)
@@ -208,7 +211,7 @@ def _watch(
     with closing(follow_people(pictures, estimator, options.person, chosen)) as frames:
         for seen in frames:
             photo = Photo(pictures.path, seen.picture, None, turned=False, notes=pictures.notes)
-            yield _show_estimate(photo, seen.people[0]) if seen.people else None
+            yield show_estimate(photo, seen.people[0]) if seen.people else None
 
 
 def _read_along(

@@ -32,7 +32,8 @@ class RendererOptions(Part):
     weights: Path | None = option(
         "--weights",
         "Rendering",
-        "Checkpoint for nhrr, safetensors; default: lite, which ships.",
+        "Checkpoint for nhrr: safetensors, or hf:owner/name on the Hugging Face Hub; default: lite,"
+        " which ships.",
         kind="path",
     )
     adapt: bool = option(

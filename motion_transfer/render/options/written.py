@@ -8,11 +8,8 @@ from typing import Any
 
 from motion_transfer.option import Option, list_options, options_from_words, parse_background
 from motion_transfer.render.options import NO_AUDIO, Garment, Partner, RenderOptions
-from motion_transfer.weights import SHIPPED
+from motion_transfer.weights import names_weights_file
 from nhrr_core.parts import PART_NAMES
-
-NAMES = ("audio", NO_AUDIO), *(("weights", name) for name in SHIPPED)
-"""Options and words that stand in a path's place and are none."""
 
 NamePath = Callable[[Option, Path], str]
 """Writes the path of an option."""
@@ -28,7 +25,10 @@ def write_value(entry: Option, value: Any, name_path: NamePath) -> Any:
     """Write an option's value as a manifest has it."""
 
     def name(path: Path) -> str:
-        return str(path) if (entry.name, str(path)) in NAMES else name_path(entry, path)
+        named = (entry.name, str(path)) == ("audio", NO_AUDIO) or (
+            entry.name == "weights" and not names_weights_file(str(path))
+        )
+        return str(path) if named else name_path(entry, path)
 
     if entry.kind in ("garments", "partners"):
         return [
