@@ -6,7 +6,6 @@ file is YAML, TOML or JSON; all three mean the same.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -22,7 +21,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from motion_transfer.errors import InputError
+from motion_transfer.errors import InputError, did_you_mean
 from motion_transfer.media.structured import (
     parse_structured,
     read_structured,
@@ -275,9 +274,8 @@ def _known_fields(place: Place) -> list[str]:
 
 
 def _unknown(name: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name[:40], known, 1)
-    hint = f"did you mean {near[0]}? " if near else ""
-    return f"unknown field; {hint}allowed are {', '.join(known)}"
+    hint = did_you_mean(name, known) or ";"
+    return f"unknown field{hint} allowed are {', '.join(known)}"
 
 
 def _reason(detail: ErrorDetails) -> str:

@@ -268,10 +268,10 @@ def test_json_events_tell_the_whole_story(studio, draft) -> None:
     events = [json.loads(line) for line in result.out.splitlines()]
     assert result.err == ""
     names = [event["event"] for event in events]
-    assert [name for name in names if name != "framesdone"] == [
+    assert [name for name in names if name != "frames-done"] == [
         *("stage", "started", "stage", "finished")
     ]
-    assert sum(event["frame_count"] for event in events if event["event"] == "framesdone") == 10
+    assert sum(event["frame_count"] for event in events if event["event"] == "frames-done") == 10
     assert events[-1]["output"] == str(output)
     assert (events[-1]["frame_count"], events[-1]["duration_seconds"]) == (5, pytest.approx(1 / 6))
 
