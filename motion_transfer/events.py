@@ -50,10 +50,10 @@ class Notice:
 
 @dataclass(frozen=True)
 class Finished:
-    """The output has its final name."""
+    """The output has its final name, or stands whole at its URL."""
 
     event: ClassVar = "finished"
-    output: Path
+    output: Path | str
     frame_count: int
     duration_seconds: float
     renderer: str

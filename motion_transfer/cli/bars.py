@@ -86,8 +86,10 @@ class LineBar:
         words = f"{self._words}: " if self._words else ""
         if not self.total:
             return f"{words}{counted(int(self.n), self._unit)}"
-        left = round(seconds / self.n * (self.total - self.n)) if self.n else 0
-        return (
-            f"{words}{self.n:.0f} of {counted(int(self.total), self._unit)},"
-            f" {self.n / self.total:.0%}, about {left // 60}:{left % 60:02d} left"
+        words += (
+            f"{self.n:.0f} of {counted(int(self.total), self._unit)}, {self.n / self.total:.0%}"
         )
+        if not 0 < self.n < self.total:
+            return words
+        left = round(seconds / self.n * (self.total - self.n))
+        return f"{words}, about {left // 60}:{left % 60:02d} left"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SETTINGS = "Over a field of the manifest, or an option of all its jobs; may be repeated."
 manifest_options = add_options(
     [
-        click.argument("manifest", metavar="FILE", type=FILE),
+        click.argument("manifest", metavar="FILE|-", type=FILE),
         click.option("--set", "settings", multiple=True, metavar="K=V", help=SETTINGS),
     ]
 )
@@ -34,6 +34,7 @@ def batch() -> None:
     \b
     mt batch validate jobs/shoot.yaml
     mt batch run jobs/shoot.yaml --workers 2 --set background=photo
+    make_jobs | mt batch run -
     """
 
 
@@ -71,7 +72,7 @@ def validate(manifest: Path, settings: tuple[str, ...]) -> None:
 
     read = read_batch(manifest, settings)
     check_batch(read)
-    tell(f"{manifest}: {counted(len(read.jobs), 'job')}, all inputs are there")
+    tell(f"{read.name}: {counted(len(read.jobs), 'job')}, all inputs are there")
 
 
 @batch.command()

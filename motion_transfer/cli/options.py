@@ -11,9 +11,24 @@ from typing import Any
 import click
 
 from motion_transfer.errors import InputError, did_you_mean
-from motion_transfer.option import Option, list_options
+from motion_transfer.option import Option, is_url, list_options
 
-FILE = click.Path(path_type=Path)
+
+class LocalPath(click.Path):
+    """A path on this machine."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if is_url(value):
+            self.fail(
+                f"{value!r} is a URL; only `mt run` and `mt batch run` fetch those", param, ctx
+            )
+        return super().convert(value, param, ctx)
+
+
+FILE = LocalPath()
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 

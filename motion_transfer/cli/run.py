@@ -51,12 +51,14 @@ def run(
     mt run --source me.png --driver me_IUV.png --garment dress.png \\
            --garment-parts torso,upper-legs --background photo -o dressed.png
     """
+    from motion_transfer.render.remote import local_run
     from motion_transfer.render.run import run as render
 
     words["garments"] = pair_words(garments, garment_parts, "garment", "parts")
     words["partners"] = pair_words(partners, partner_person, "partner", "person")
-    options = options_from_words(RenderOptions, words)
-    render(options, choose_listener(quiet=quiet, as_json=as_json))
+    listener = choose_listener(quiet=quiet, as_json=as_json)
+    with local_run(RenderOptions, words, listener) as (local, listen):
+        render(options_from_words(RenderOptions, local), listen)
 
 
 @click.command()

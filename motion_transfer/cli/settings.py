@@ -1,8 +1,8 @@
 """Options that stand in a file (`--config`) or in variables (`MT_RUN_WORKERS`), not in the command.
 
 One mechanism for every option of every command: what is found becomes click's defaults for the
-command that is called, as text, so that it is checked as if it had been typed. The command line goes
-before variables, these before the file, and the file before an option's own default.
+command that is called, as text, so that it is checked as if it had been typed. The command line
+goes before variables, these before the file, and the file before an option's own default.
 """
 
 from __future__ import annotations

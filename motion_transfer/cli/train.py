@@ -15,7 +15,13 @@ import click
 from tqdm import tqdm
 
 from motion_transfer.cli.bars import is_interactive
-from motion_transfer.cli.options import CommandGroup, SectionCommand, described_options, section
+from motion_transfer.cli.options import (
+    FILE,
+    CommandGroup,
+    SectionCommand,
+    described_options,
+    section,
+)
 from motion_transfer.cli.people import prepare_body_model
 from motion_transfer.cli.progress import CountBar
 from motion_transfer.cli.terminal import counted
@@ -30,7 +36,6 @@ from motion_transfer.training.config import (
     write_toml,
 )
 
-FILE = click.Path(path_type=Path)
 run_option = section("Run")
 loss_option = section(LOSSES)
 speed_option = section("Speed")
@@ -123,7 +128,8 @@ def train(
     if leads:
         click.echo(
             f"{result.weights}: {counted(result.step, 'step')},"
-            f" {result.samples_per_second:.2f} samples/s, {result.wait_share:.0%} of the time waiting for data"
+            f" {result.samples_per_second:.2f} samples/s,"
+            f" {result.wait_share:.0%} of the time waiting for data"
         )
     if result.stopped:
         run = planned.config.run

@@ -214,7 +214,7 @@ def test_comparison_and_contact_sheet(studio, draft) -> None:
     photo = frames_of(source)[0, ::2, ::2]
     np.testing.assert_allclose(frames[0, :, :64].astype(int), photo, atol=2)
     assert_dressed(frames[:, :, 128:], studio.walk(5), 0.5)
-    assert frames_of(sheet).shape == (1, 2 * 96, 4 * 192, 3)
+    assert frames_of(sheet).shape == (1, 2 * (96 + 28) + 8, 4 * (192 + 8) + 8, 3)
 
 
 def test_a_garment_in_place(studio, draft) -> None:

@@ -363,7 +363,7 @@ def test_the_report_knows_jobs_by_their_outputs(studio, run, walk) -> None:
     first = facts_of(run(anna, ben, gone))
     assert first["counts"] == {"done": 2, "failed": 1}
     later = facts_of(run(gone, ben, anna))
-    pictures = [{j["name"]: j["result_picture"] for j in f["jobs"]} for f in (first, later)]
+    pictures = [{j["name"]: j["source_picture"] for j in f["jobs"]} for f in (first, later)]
     assert pictures[0] == pictures[1]
     assert pictures[0].pop("gone.png") is None
     folder = studio.folder / "out/shoot.report"
