@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from motion_transfer.batch.events import BatchEvent, BatchListener, JobDone, JobFailed
 from motion_transfer.batch.job import Job
@@ -56,8 +56,7 @@ class RemoteInputs:
         wanted = {job.index: self._wanted(job) for job in jobs}
         paths = sorted({path for found in wanted.values() for path in found})
         try:
-            with ThreadPoolExecutor(AT_ONCE) as pool:
-                problems = dict(zip(paths, pool.map(self._fetch, paths), strict=True))
+            problems = self._fetch_all(paths)
             refused = {
                 index: next(filter(None, map(problems.get, found)), None)
                 for index, found in wanted.items()
@@ -69,6 +68,13 @@ class RemoteInputs:
 
     def _wanted(self, job: Job) -> list[Path]:
         return [path for path in _paths_in(job.options) if path in self._urls]
+
+    def _fetch_all(self, paths: Sequence[Path]) -> dict[Path, str | None]:
+        pool = ThreadPoolExecutor(AT_ONCE)
+        try:
+            return dict(zip(paths, pool.map(self._fetch, paths), strict=True))
+        finally:
+            pool.shutdown(cancel_futures=True)  # after a Ctrl-C, only what is under way is left
 
     def _fetch(self, path: Path) -> str | None:
         """Fetch one, with the IUV beside it. Returns: Why that cannot be done."""
@@ -104,6 +110,13 @@ class Deliveries:
         self._speaking = threading.Lock()
         self._pool = ThreadPoolExecutor(1)  # jobs finish one by one
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_error: object) -> None:
+        """Wait for what is on its way; after an error, begin nothing more."""
+        self._pool.shutdown(cancel_futures=kind is not None)
+
     def __call__(self, event: BatchEvent) -> None:
         if isinstance(event, JobDone):
             self._pool.submit(self._deliver, event)
@@ -111,8 +124,7 @@ class Deliveries:
             self._tell(event)
 
     def finish(self, done: Sequence[Job]) -> None:
-        """Wait for what is on its way; send what an earlier run made and could not send."""
-        self._pool.shutdown()
+        """Send what an earlier run made and could not send."""
         for job in done:
             try:
                 for path in _outputs_of(job):

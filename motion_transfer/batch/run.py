@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,7 +115,7 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
                 refused=refused,
             )
             listener(BatchStarted(len(jobs), workers.count))
-            with signals.noted():
+            with deliveries or nullcontext(), signals.noted():
                 tally = scheduler.run()
         if deliveries:
             deliveries.finish([j for j in jobs if batch.state.status_of(j.options.output) == DONE])

@@ -6,6 +6,7 @@ grows with neither frames nor running jobs, of which there are only a few at a t
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -28,6 +29,8 @@ from motion_transfer.media.unchanged import status_key
 from motion_transfer.media.work import WorkFolder, was_published
 from motion_transfer.render.chunks import render
 from motion_transfer.render.workers import Workers
+
+log = logging.getLogger(__name__)
 
 POLL_SECONDS = 0.5  # how soon a signal is heeded
 SPARE_JOBS = 2  # planned ahead, beyond one for each worker
@@ -269,7 +272,9 @@ class Scheduler:
         place, task = self._running.pop(future)
         active = task.owner
         active.running -= 1
-        active.work_seconds += time.monotonic() - task.began
+        seconds = time.monotonic() - task.began
+        active.work_seconds += seconds
+        log.debug("worker %d, %s: %s, %.2f s", place, active.name, task.kind, seconds)
         try:
             result = future.result()
         except self.workers.lost_error:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
+from motion_transfer.cli.event_lines import VERSION
 from motion_transfer.cli.options import FILE, CommandGroup, add_options, events_option
 from motion_transfer.cli.progress import CountBar, JsonPrinter
 from motion_transfer.cli.terminal import counted, printable, tell
@@ -85,7 +86,8 @@ def status(manifest: Path, settings: tuple[str, ...], as_json: bool) -> None:
     read = read_batch(manifest, settings)
     counts = count_jobs(read)
     if as_json:
-        click.echo(json.dumps(counts))
+        words = {word.replace(" ", "_"): number for word, number in counts.items()}
+        click.echo(json.dumps({"version": VERSION, **words}))
         return
     click.echo(", ".join(f"{number} {word}" for word, number in counts.items()))
     for job in read.jobs:

@@ -93,7 +93,7 @@ def train(
     accelerate launch --multi-gpu -m motion_transfer train --config train.toml -o run/
 
     How long it takes: the default is 100,000 steps of 4 pairs. Two CPU cores make 1 to 2 pairs a
-    second with the preset lite, which is three to five days, and weeks with the full one. An H100
+    second with the preset lite, which is two to five days, and weeks with the full one. An H100
     makes 210 a second with lite, and 100,000 steps of 48 in six hours. See --steps and --minutes.
 
     A run that is stopped (Ctrl-C, SIGTERM) writes a checkpoint first. Several devices are started

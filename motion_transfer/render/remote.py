@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from motion_transfer.errors import FetchError, OutputError
-from motion_transfer.events import Event, Finished, Listener
+from motion_transfer.events import Event, Finished, Listener, Notice
 from motion_transfer.media.files import cache_folder
 from motion_transfer.media.iuv.formats import list_clip_iuv_names, list_iuv_names
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES
-from motion_transfer.media.remote import Fetched, check_free, name_of, send
+from motion_transfer.media.remote import Fetched, check_free, name_of, send, shown_url
 from motion_transfer.media.work import key_of
 from motion_transfer.option import is_url, list_options
 
@@ -63,13 +63,14 @@ def local_run(
                 staged[Path(local[name])] = written
         for name, written in words.items():
             if name in described and name not in OUTPUTS:
-                local[name] = _bring(fetched, name, written)
+                local[name] = _bring(fetched, name, written, listener)
             else:
                 local.setdefault(name, written)
         if staged:
             local["force"] = True  # what lies there is of a run that could not send it
         yield local, listen
         for path, url in staged.items():
+            listener(Notice(f"sending {shown_url(url)}"))
             _deliver(Path(path), url)
         for event in held:
             listener(event)
@@ -83,16 +84,17 @@ def beside(photo: str) -> tuple[str, ...]:
     return tuple(name.name for name in names)
 
 
-def _bring(fetched: Fetched, option: str, written: Any) -> Any:
+def _bring(fetched: Fetched, option: str, written: Any, listener: Listener) -> Any:
     """Replace each URL in what was written for an option."""
     match written:
         case str() if is_url(written):
+            listener(Notice(f"fetching {shown_url(written)}"))  # it may take long
             around = beside(written) if option in PHOTOS else ()
             return str(fetched.bring(written, option.rstrip("s"), around))
         case list() | tuple():
-            return type(written)(_bring(fetched, option, each) for each in written)
+            return type(written)(_bring(fetched, option, each, listener) for each in written)
         case dict():
-            return {key: _bring(fetched, option, each) for key, each in written.items()}
+            return {key: _bring(fetched, option, each, listener) for key, each in written.items()}
     return written
 
 

@@ -388,7 +388,7 @@ def test_status_and_clean(studio, run, walk, mt) -> None:
     told = mt("batch", "status", manifest).out.splitlines()
     assert told[0] == "1 done, 2 failed, 1 to do"
     assert told[1].startswith("failed: bad.mp4: ")
-    assert json.loads(mt("batch", "status", manifest, "--json").out)["to do"] == 1
+    assert json.loads(mt("batch", "status", manifest, "--json").out)["to_do"] == 1
 
     with result.batch.state.held():
         refused = mt("batch", "clean", manifest)
