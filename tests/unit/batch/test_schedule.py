@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -371,6 +372,21 @@ def test_the_report_knows_jobs_by_their_outputs(studio, run, walk) -> None:
     assert all(
         f'src="{name}"' in (folder / "index.html").read_text() for name in pictures[0].values()
     )
+
+
+def test_seconds_of_a_job_leave_out_its_waiting(run, walk) -> None:
+    """The jobs begin together and wait for each other: what they worked adds up to what passed."""
+
+    def take_time(name: str, _number: int) -> None:
+        time.sleep(0.1 if name == "render" else 0)
+
+    began = time.monotonic()
+    jobs = [job(f"{name}.png", frames="0") for name in "abc"]
+    facts = facts_of(run(*jobs, before=take_time))
+    passed = time.monotonic() - began
+    seconds = [entry["seconds"] for entry in facts["jobs"]]
+    assert min(seconds) >= 0.1
+    assert sum(seconds) <= passed
 
 
 def facts_of(result: Run) -> dict[str, Any]:
