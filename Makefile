@@ -33,7 +33,7 @@ lint: $(VENV)/.installed-dev  ## style, types, and the direction of imports
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
-schema: $(VENV)/.installed  ## publish the JSON Schema of manifests
+schema: $(VENV)/.installed  ## publish the JSON Schemas of manifests and events
 	$(BIN)/python tools/build_schema.py
 
 check: lint demo test  ## everything that has to pass before a change lands

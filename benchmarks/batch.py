@@ -109,7 +109,7 @@ def manifest(folder: Path, sizes: Sizes) -> None:
             f" ({min(walls):.1f} to {max(walls):.1f}; {median(used):.1f} s of a core)",
             flush=True,
         )
-    moments: dict[str, list[float]] = {"batchstarted": [], "jobplanned": []}
+    moments: dict[str, list[float]] = {"batch-started": [], "job-planned": []}
     for _ in range(sizes.rounds):
         began = time.perf_counter()
         command = [*MT, "run", str(folder / "large.json"), "--json", "--workers", "1"]
@@ -120,7 +120,7 @@ def manifest(folder: Path, sizes: Sizes) -> None:
                 kind = json.loads(line)["event"]
                 if kind in moments:
                     moments[kind].append(time.perf_counter() - began)
-                if kind == "jobplanned":
+                if kind == "job-planned":
                     process.kill()
                     break
     print(

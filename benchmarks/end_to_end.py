@@ -79,7 +79,7 @@ def time_run(
             event = json.loads(line)
             if event["event"] == "stage":
                 stage = event["name"]
-            elif event["event"] == "framesdone" and stage == "render" and event["frame_count"]:
+            elif event["event"] == "frames-done" and stage == "render" and event["frame_count"]:
                 first = first or time.perf_counter() - began
             elif event["event"] == "finished":
                 rendering = event["render_seconds"]

@@ -137,7 +137,7 @@ def ray(bench: Bench) -> Tries:
             [*MT, "batch", "run", str(manifest), *address], stdout=subprocess.PIPE, text=True
         ) as process:
             for line in process.stdout or ():
-                if json.loads(line)["event"] == "jobframes" and lost < 20:
+                if json.loads(line)["event"] == "job-frames" and lost < 20:
                     while len(nodes) < 2:  # the other one takes over
                         nodes.append(cluster.add_node(num_cpus=1))
                     cluster.remove_node(nodes.pop(0), allow_graceful=False)
@@ -240,7 +240,7 @@ def at_stage(bench: Bench, stage: str, change: Callable[[], object]) -> tuple[in
         for line in process.stdout:
             event: dict[str, Any] = json.loads(line)
             now = event.get("name", now) if event["event"] == "stage" else now
-            if event["event"] == "framesdone" and event["frame_count"] and now == stage:
+            if event["event"] == "frames-done" and event["frame_count"] and now == stage:
                 change()
                 stage = "-"
         return process.wait(), process.stderr.read().splitlines()

@@ -14,6 +14,8 @@ Messages say what was wrong, where, and what to do next.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class MotionTransferError(Exception):
     """The base of everything that this package raises on purpose.
@@ -60,6 +62,14 @@ class TrainingError(MotionTransferError):
 
 class FetchError(MotionTransferError):
     """Something that has to be downloaded cannot be had."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Continue a message about a name that is none by the one that is most like it, if any is."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name[:40], known, 1)  # of a long one, the search takes long
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def first_line(error: Exception) -> str:

@@ -33,6 +33,7 @@ EXTRAS = {
     "preview": Extra("the page needs", {"starlette": "starlette", "uvicorn": "uvicorn"}),
     "c2pa": Extra("Content Credentials need", {"c2pa": "c2pa-python"}),
     "hub": Extra("weights on the Hugging Face Hub need", {"huggingface_hub": "huggingface-hub"}),
+    "remote": Extra("URLs need", {"fsspec": "fsspec"}),
     "cluster": Extra("the ray engine needs", {"ray": "ray"}),
 }
 INSTALLED_BY = {"tensorboard": "train", "adapt": "train"}

@@ -173,6 +173,21 @@ SCENES = ("photo", "driver", "transparent")
 """Backgrounds that are words, and no colour."""
 
 
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*(::[^/]*)?://")
+
+
+def is_url(text: object) -> bool:
+    """Tell whether a path is a URL; a Windows drive and `people:walk` are none."""
+    return _URL.match(str(text)) is not None
+
+
+def parse_path(text: str) -> Path:
+    """Read a path on this machine. Raises: InputError for a URL."""
+    if is_url(text):
+        raise InputError(f"{text!r} is a URL; only `mt run` and `mt batch run` fetch those")
+    return Path(text)
+
+
 def parse_colour(text: str) -> tuple[int, int, int] | None:
     """Read the RGB of `white`, `black` or `#rrggbb`; None for `photo`. Raises: InputError."""
     if text == "photo":
@@ -200,7 +215,7 @@ def parse_background(text: str) -> tuple[int, int, int] | str | Path:
                 f"background {text[:LONGEST_SHOWN]!r}; write a colour as #rrggbb, white, black,"
                 f" {', '.join(SCENES)}, or name a picture or a video"
             ) from None
-    return Path(text)
+    return parse_path(text)
 
 
 def _read_colour(text: str) -> tuple[int, int, int]:
@@ -304,11 +319,11 @@ def _unchanged(value: Any) -> Any:
 
 
 def _paths(written: str | Sequence[str]) -> tuple[Path, ...]:
-    return tuple(Path(text) for text in ([written] if isinstance(written, str) else written))
+    return tuple(parse_path(text) for text in ([written] if isinstance(written, str) else written))
 
 
 PARSERS: dict[str, Callable[[Any], Any]] = {
-    "path": Path,
+    "path": parse_path,
     "paths": _paths,
     "words": tuple,
     "number": parse_number,

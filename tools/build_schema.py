@@ -1,4 +1,4 @@
-"""Write the JSON Schema of manifests to `jobs/manifest.schema.json`.
+"""Write the JSON Schemas of manifests and of events to `jobs/`.
 
 python tools/build_schema.py
 """
@@ -8,13 +8,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from motion_transfer.batch.manifest import schema
+from motion_transfer.batch import manifest
+from motion_transfer.cli import event_lines
 
-TARGET = Path(__file__).parents[1] / "jobs" / "manifest.schema.json"
+JOBS = Path(__file__).parents[1] / "jobs"
 
 
 def main() -> None:
-    TARGET.write_text(json.dumps(schema(), indent=1) + "\n")
+    for name, schema in (("manifest", manifest.schema()), ("events", event_lines.schema())):
+        (JOBS / f"{name}.schema.json").write_text(json.dumps(schema, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal
 
-from motion_transfer.batch.expand import Job
+from motion_transfer.batch.job import Job
 from motion_transfer.batch.tasks import ChunkOutline, Fetch, Outline
 from motion_transfer.media.work import WorkFolder, key_of
 from motion_transfer.option import part_of
@@ -68,6 +67,8 @@ class ActiveJob:
         running: How many tasks of this job have not come back.
         left: How many chunks are not finished.
         tries: How often each chunk (by index), or another task (by kind), has failed.
+        work_seconds: How long workers worked for it; what it shares counts where it was first
+            needed.
         ours: Whether the existing output is what an earlier run of this job made.
     """
 
@@ -84,7 +85,7 @@ class ActiveJob:
     left: int = 0
     tries: Counter[Any] = field(default_factory=Counter)
     error: str = ""
-    began: float = field(default_factory=time.monotonic)
+    work_seconds: float = 0.0
 
     @property
     def name(self) -> str:

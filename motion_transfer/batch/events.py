@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 
 @dataclass(frozen=True)
 class BatchStarted:
     """Jobs were read, and the first of them begin."""
 
+    event: ClassVar = "batch-started"
     job_count: int
     workers: int
 
@@ -19,6 +21,7 @@ class BatchStarted:
 class JobPlanned:
     """A job's frames are known; `done_count` of them were finished by an earlier run."""
 
+    event: ClassVar = "job-planned"
     name: str
     frame_count: int
     done_count: int
@@ -28,6 +31,7 @@ class JobPlanned:
 class JobFrames:
     """So many more frames of a job are done."""
 
+    event: ClassVar = "job-frames"
     name: str
     frame_count: int
 
@@ -36,24 +40,28 @@ class JobFrames:
 class JobNotice:
     """Something the user should know of a job, though the work goes on."""
 
+    event: ClassVar = "job-notice"
     name: str
     message: str
 
 
 @dataclass(frozen=True)
 class JobDone:
-    """A job's output has its final name."""
+    """A job's output has its final name, or stands whole at its URL."""
 
+    event: ClassVar = "job-done"
     name: str
-    output: Path
+    output: Path | str
     frame_count: int
     seconds: float
+    """Of the workers: what they worked for the job, without its waiting for others."""
 
 
 @dataclass(frozen=True)
 class JobFailed:
     """A job will not be done in this run."""
 
+    event: ClassVar = "job-failed"
     name: str
     message: str
 
@@ -62,6 +70,7 @@ class JobFailed:
 class BatchStopping:
     """A first Ctrl-C: running chunks are finished, nothing new begins."""
 
+    event: ClassVar = "batch-stopping"
     running_count: int
 
 
@@ -69,6 +78,7 @@ class BatchStopping:
 class BatchFinished:
     """Nothing is running any more. `left_count` jobs were not begun or not finished."""
 
+    event: ClassVar = "batch-finished"
     done_count: int
     current_count: int
     failed_count: int

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from motion_transfer.batch.job import Job
 from motion_transfer.batch.manifest import (
     PLACEHOLDERS,
     Manifest,
@@ -21,11 +22,13 @@ from motion_transfer.batch.manifest import (
     Place,
     plain,
 )
-from motion_transfer.errors import InputError
+from motion_transfer.batch.remote import RemoteInputs
+from motion_transfer.errors import InputError, MotionTransferError
 from motion_transfer.media.files import check_readable
 from motion_transfer.media.iuv.formats import names_file
+from motion_transfer.media.remote import find_urls, name_of
 from motion_transfer.media.structured import shown
-from motion_transfer.option import list_options, parse_background
+from motion_transfer.option import is_url, list_options, parse_background
 from motion_transfer.render.inputs import audio_files, driver_files
 from motion_transfer.render.options import NO_AUDIO, RenderOptions
 from motion_transfer.weights import find_weights, names_weights_file
@@ -38,22 +41,6 @@ MOST_JOBS = 100_000  # what a gigabyte holds
 FORMAT = re.compile(r"0?[0-9]{0,2}d?")  # of a placeholder, such as 04 in {index:04}
 ANY_OUTPUT = "OUTPUT"
 """Stands for an output's name in a message that many jobs share."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """One run of a manifest.
-
-    Attributes:
-        index: From 0, in the manifest's order.
-        name: What the report calls it.
-        options: Its paths are absolute.
-    """
-
-    index: int
-    name: str
-    priority: int
-    options: RenderOptions
 
 
 @dataclass(frozen=True)
@@ -73,17 +60,22 @@ class _Output:
 
 def find_output_root(manifest: Manifest, path: Path) -> Path:
     """Find the folder, absolute, below which the outputs of the manifest at `path` lie."""
+    if is_url(manifest.output_root):  # outputs are made here, and sent there
+        return path.absolute().with_name(f"{path.stem}.outputs")
     root = path.absolute().parent / manifest.output_root
     return root.resolve() if ".." in root.parts else root
 
 
-def expand(manifest: Manifest, text: ManifestText) -> list[Job]:
+def expand(manifest: Manifest, text: ManifestText, remote: RemoteInputs | None = None) -> list[Job]:
     """Lay out every job, in order.
 
+    Args:
+        remote: Notes inputs that are URLs, and says where they will lie.
     Raises: ManifestError for a glob without a match, a template that is none, two jobs with one
         output, an output outside the root, or options that do not go together.
     """
-    spread = _Spread(manifest, text)
+    remote = remote or RemoteInputs(find_output_root(manifest, text.path) / "remote")
+    spread = _Spread(manifest, text, remote)
     jobs: list[Job] = []
     places: dict[str, Place] = {}
     for place, source, driver, entry in spread.pairs():
@@ -99,7 +91,7 @@ def expand(manifest: Manifest, text: ManifestText) -> list[Job]:
         name = getattr(entry, "name", None) or outputs[0].written
         jobs.append(Job(len(jobs), name, entry.priority, options))
     if not jobs:
-        raise ManifestError(f"{text.path}: no jobs; write some under jobs or matrix")
+        raise ManifestError(f"{text.name}: no jobs; write some under jobs or matrix")
     _check_nesting(places, text)
     return jobs
 
@@ -121,7 +113,8 @@ def _check_nesting(places: dict[str, Place], text: ManifestText) -> None:
 class _Spread:
     """Spreads one manifest; what many of its jobs share is found out once."""
 
-    def __init__(self, manifest: Manifest, text: ManifestText) -> None:
+    def __init__(self, manifest: Manifest, text: ManifestText, remote: RemoteInputs) -> None:
+        self._remote = remote
         self._manifest = manifest
         self._text = text
         self._folder = text.path.absolute().parent
@@ -191,11 +184,11 @@ class _Spread:
         """Read a value; paths are laid in the manifest's folder."""
         if OPTIONS[word].kind in ("garments", "partners"):
             value = [
-                {**g, **{k: str(self._folder / g[k]) for k in ("photo", "iuv") if g.get(k)}}
+                {**g, **{k: str(self._laid(k, g[k])) for k in ("photo", "iuv") if g.get(k)}}
                 for g in value
             ]
         elif OPTIONS[word].kind == "background":
-            if isinstance(parse_background(value), Path):
+            if is_url(value) or isinstance(parse_background(value), Path):
                 value = str(self._laid(word, value))
         elif OPTIONS[word].kind == "path" and word not in BELOW_ROOT:
             return self._laid(word, value)
@@ -205,6 +198,8 @@ class _Spread:
         return OPTIONS[word].read(value)
 
     def _laid(self, word: str, value: str) -> Path:
+        if is_url(value):
+            return self._remote.place(value)
         named = (word, value) == ("audio", NO_AUDIO) or (
             word == "weights" and not names_weights_file(value)
         )
@@ -224,6 +219,9 @@ class _Spread:
     def _matches(self, place: Place, patterns: Sequence[str], *, photos: bool) -> list[str]:
         found: list[str] = []
         for pattern in patterns:
+            if is_url(pattern):  # in which ? begins a query
+                found += self._remote_matches(place, pattern, photos=photos)
+                continue
             if not any(mark in pattern for mark in GLOB_MARKS) or not _names_file(pattern):
                 found.append(pattern)
                 continue
@@ -249,11 +247,30 @@ class _Spread:
             found += matches
         return found
 
+    def _remote_matches(self, place: Place, pattern: str, *, photos: bool) -> list[str]:
+        if "*" not in pattern:
+            return [pattern]
+        try:
+            matches = find_urls(pattern)
+        except MotionTransferError as error:
+            raise ManifestError(f"{self._text.where(place)}: {error}") from error
+        if photos:
+            matches = [m for m in matches if not Path(name_of(m)).stem.lower().endswith("_iuv")]
+        if not matches or len(matches) > MOST_JOBS:
+            count = f"more than {MOST_JOBS:,} files" if matches else "nothing"
+            raise ManifestError(f"{self._text.where(place)}: {shown(pattern)} matches {count}")
+        return matches
+
     def _output(self, place: Place, template: str, names: dict[str, Any]) -> _Output:
         if not _is_template(template):
             raise ManifestError(
                 f"{self._text.where(place)}: {shown(template)} is no template; known are"
                 f" {PLACEHOLDERS}"
+            )
+        if is_url(template):
+            raise ManifestError(
+                f"{self._text.where(place)}: {shown(template)} is a URL; write where it begins as"
+                " output_root, and here what lies below it"
             )
         written = template.format(**names)
         try:
@@ -307,7 +324,7 @@ def name_driver(driver: str) -> str:
     return _stem(driver if _names_file(driver) else driver.partition(":")[2].partition(",")[0])
 
 
-def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
+def check_inputs(jobs: Sequence[Job], remote: RemoteInputs | None = None) -> Iterator[str]:
     """Say what cannot be read, once for each file; names are looked at, and nothing is opened."""
     known: set[Path] = set()
     for job in jobs:
@@ -328,8 +345,11 @@ def check_inputs(jobs: Sequence[Job]) -> Iterator[str]:
                 continue
             known.add(path)
             try:
-                check_readable(path, what, folder=what in MAY_BE_FOLDERS)
-            except InputError as error:
+                if remote is not None and remote.url_of(path) is not None:
+                    remote.check(path, what)
+                else:
+                    check_readable(path, what, folder=what in MAY_BE_FOLDERS)
+            except MotionTransferError as error:
                 yield f"job {job.index} ({job.name}): {error}"
 
 
@@ -340,7 +360,7 @@ _names_file = cache(names_file)
 
 @cache
 def _stem(path: str) -> str:
-    return Path(path).stem
+    return Path(name_of(path) if is_url(path) else path).stem
 
 
 @cache

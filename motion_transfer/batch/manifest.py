@@ -6,7 +6,6 @@ file is YAML, TOML or JSON; all three mean the same.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -22,14 +21,15 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from motion_transfer.errors import InputError
+from motion_transfer.errors import InputError, did_you_mean
 from motion_transfer.media.structured import (
     parse_structured,
+    read_stdin,
     read_structured,
     shown,
     shown_name,
 )
-from motion_transfer.option import Option, list_options
+from motion_transfer.option import Option, is_url, list_options
 from motion_transfer.render.options import RenderOptions
 
 MOST_ERRORS = 10  # a screenful: whoever mends those sees the next ones
@@ -92,8 +92,10 @@ def _type_of(entry: Option) -> Any:
 
 def _checked(entry: Option) -> Any:
     def check(value: Any) -> Any:
+        several = value if isinstance(value, list) else [value]
         try:
-            entry.read(plain(value))
+            if not any(map(is_url, several)):  # which are files when a job is laid out
+                entry.read(plain(value))
         except InputError as error:
             raise ValueError(str(error)) from None  # of which pydantic makes a message
         return value
@@ -191,6 +193,12 @@ SETTABLE = [f for f in Manifest.model_fields if f not in ("version", "defaults",
 """The manifest's own fields that `--set` may name; any other name is an option of its jobs."""
 
 
+STDIN = Path("-")
+STANDS_FOR_STDIN = Path("stdin.yaml")
+"""The file, in the working directory, that standard input is as good as: paths are relative to its
+folder, and journal and report are called after it."""
+
+
 class ManifestError(InputError):
     """A manifest that cannot be used; the message has one line for each thing wrong."""
 
@@ -205,7 +213,7 @@ def read_manifest(path: Path, settings: Sequence[str] = ()) -> tuple[Manifest, M
     text = ManifestText(path)
     data = text.data
     if not isinstance(data, dict):
-        raise ManifestError(f"{path}: a manifest is a mapping with version and jobs")
+        raise ManifestError(f"{text.name}: a manifest is a mapping with version and jobs")
     given = {_set(data, setting): setting for setting in settings}
     try:
         return Manifest.model_validate(data), text
@@ -217,12 +225,24 @@ class ManifestText:
     """A manifest as it was written, which can say where a field stands."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file. Raises: ManifestError if it cannot be, naming the line where possible."""
-        self.path = path
+        """Read the file, or standard input for `STDIN`.
+
+        Raises: ManifestError if it cannot be, naming the line where possible.
+        """
+        self.path = STANDS_FOR_STDIN if path == STDIN else path
+        self._name = "standard input" if path == STDIN else str(path)
         try:
-            self._content = read_structured(path, "manifest")
+            if path == STDIN:  # JSON is YAML, too
+                self._content = parse_structured(read_stdin("manifest"), ".yaml", self._name)
+            else:
+                self._content = read_structured(path, "manifest")
         except InputError as error:
             raise ManifestError(str(error)) from None
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self._name
 
     @property
     def data(self) -> Any:
@@ -233,7 +253,7 @@ class ManifestText:
         """Name file, line where possible, and field, for messages."""
         line = self._content.line(place)
         words = "".join(f"[{s}]" if isinstance(s, int) else f".{shown_name(s)}" for s in place)
-        return f"{self.path}{f':{line}' if line else ''}: {words.lstrip('.')}"
+        return f"{self._name}{f':{line}' if line else ''}: {words.lstrip('.')}"
 
     def error(self, details: Sequence[ErrorDetails], given: Mapping[str, str]) -> ManifestError:
         """Say everything that is wrong, a line each.
@@ -275,9 +295,8 @@ def _known_fields(place: Place) -> list[str]:
 
 
 def _unknown(name: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name[:40], known, 1)
-    hint = f"did you mean {near[0]}? " if near else ""
-    return f"unknown field; {hint}allowed are {', '.join(known)}"
+    hint = did_you_mean(name, known) or ";"
+    return f"unknown field{hint} allowed are {', '.join(known)}"
 
 
 def _reason(detail: ErrorDetails) -> str:

@@ -5,18 +5,22 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from motion_transfer.batch.events import BatchFinished, BatchListener, BatchStarted
-from motion_transfer.batch.expand import Job, check_inputs, expand, find_output_root
+from motion_transfer.batch.expand import check_inputs, expand, find_output_root
+from motion_transfer.batch.job import Job
 from motion_transfer.batch.manifest import Manifest, ManifestError, read_manifest
+from motion_transfer.batch.remote import Deliveries, RemoteInputs
 from motion_transfer.batch.report import write_report
 from motion_transfer.batch.schedule import Scheduler, Tally
 from motion_transfer.batch.signals import Signals
-from motion_transfer.batch.state import TO_DO, BatchState
+from motion_transfer.batch.state import DONE, TO_DO, BatchState
 from motion_transfer.errors import InputError
 from motion_transfer.media.publish import explain_disk_errors
+from motion_transfer.option import is_url
 from motion_transfer.render.workers import LocalWorkers, Workers
 
 ENGINES = ("local", "ray")
@@ -62,22 +66,25 @@ class Batch:
     manifest: Manifest
     jobs: list[Job]
     state: BatchState
-    path: Path
+    remote: RemoteInputs
+    name: str
 
 
 def read_batch(path: Path, settings: Sequence[str] = ()) -> Batch:
-    """Read a manifest and lay out its jobs. Raises: ManifestError."""
+    """Read a manifest, `-` from standard input, and lay out its jobs. Raises: ManifestError."""
     manifest, text = read_manifest(path, settings)
-    root = find_output_root(manifest, path)
-    return Batch(manifest, expand(manifest, text), BatchState(path, root), path)
+    root = find_output_root(manifest, text.path)
+    state = BatchState(text.path, root)
+    remote = RemoteInputs(state.folder / "remote")
+    return Batch(manifest, expand(manifest, text, remote), state, remote, text.name)
 
 
 def check_batch(batch: Batch) -> None:
     """Check that all inputs are there. Raises: ManifestError naming those that are missing."""
-    problems = list(check_inputs(batch.jobs))
+    problems = list(check_inputs(batch.jobs, batch.remote))
     if problems:
         more = [f"and {len(problems) - MOST_PROBLEMS} more"] * (len(problems) > MOST_PROBLEMS)
-        lines = [f"{batch.path}: {words}" for words in problems[:MOST_PROBLEMS]]
+        lines = [f"{batch.name}: {words}" for words in problems[:MOST_PROBLEMS]]
         raise ManifestError(*lines, *more)
 
 
@@ -93,32 +100,48 @@ def run_batch(options: BatchOptions, listener: BatchListener) -> Tally:
     with explain_disk_errors(batch.state.folder), batch.state.held():
         if options.restart:
             batch.state.forget()
-        workers, signals = _open_workers(options, batch.state.scratch), Signals()
-        scheduler = Scheduler(
-            jobs,
-            workers,
-            batch.state,
-            retries=batch.manifest.retries,
-            keep_going=options.keep_going,
-            restart=options.restart,
-            listener=listener,
-            signals=signals,
-        )
-        listener(BatchStarted(len(jobs), workers.count))
-        with signals.noted():
-            tally = scheduler.run()
+        deliveries = _deliveries(batch, jobs, listener)
+        with batch.remote.fetched(jobs) as refused:
+            workers, signals = _open_workers(options, batch.state.scratch), Signals()
+            scheduler = Scheduler(
+                jobs,
+                workers,
+                batch.state,
+                retries=batch.manifest.retries,
+                keep_going=options.keep_going,
+                restart=options.restart,
+                listener=deliveries or listener,
+                signals=signals,
+                refused=refused,
+            )
+            listener(BatchStarted(len(jobs), workers.count))
+            with deliveries or nullcontext(), signals.noted():
+                tally = scheduler.run()
+        if deliveries:
+            deliveries.finish([j for j in jobs if batch.state.status_of(j.options.output) == DONE])
+            tally.failed += deliveries.failed_count
         counts = (tally.done, tally.current, tally.failed, tally.left)
         seconds = time.monotonic() - began
         listener(BatchFinished(*counts, seconds, scheduler.feature_maps))
-        write_report(batch.jobs, batch.state)  # of all jobs, and after a Ctrl-C as well
+        report = write_report(batch.jobs, batch.state)  # of all jobs, after a Ctrl-C as well
+        if deliveries:
+            deliveries.send_report(report.parent)
     if signals.interrupted:
         raise KeyboardInterrupt
     return tally
 
 
+def _deliveries(batch: Batch, jobs: list[Job], listener: BatchListener) -> Deliveries | None:
+    """Make what sends the outputs, where they are to go to a URL."""
+    url = batch.manifest.output_root
+    if not is_url(url):
+        return None
+    return Deliveries(find_output_root(batch.manifest, batch.state.manifest), url, jobs, listener)
+
+
 def count_jobs(batch: Batch) -> dict[str, int]:
     """Count the jobs that are done, failed and to do, as far as was noted."""
-    counts = {"done": 0, "failed": 0, TO_DO: 0}
+    counts = {DONE: 0, "failed": 0, TO_DO: 0}
     for job in batch.jobs:
         counts[batch.state.status_of(job.options.output)] += 1
     return counts

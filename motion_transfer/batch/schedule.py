@@ -6,19 +6,21 @@ grows with neither frames nor running jobs, of which there are only a few at a t
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from motion_transfer.batch import events, tasks
 from motion_transfer.batch.active import ActiveJob, Shared, scan_name, source_name
-from motion_transfer.batch.expand import Job
+from motion_transfer.batch.job import Job
 from motion_transfer.batch.signals import Signals
 from motion_transfer.batch.state import BatchState, is_current, is_ours, sign
 from motion_transfer.errors import InputError, MotionTransferError, OutputError
@@ -27,6 +29,8 @@ from motion_transfer.media.unchanged import status_key
 from motion_transfer.media.work import WorkFolder, was_published
 from motion_transfer.render.chunks import render
 from motion_transfer.render.workers import Workers
+
+log = logging.getLogger(__name__)
 
 POLL_SECONDS = 0.5  # how soon a signal is heeded
 SPARE_JOBS = 2  # planned ahead, beyond one for each worker
@@ -40,6 +44,7 @@ class Task:
     Attributes:
         shared: The result that it makes, if other jobs wait for it as well.
         chunks: Those that it renders.
+        began: When it was given to a worker, who is free by then.
     """
 
     function: Callable[..., Any]
@@ -47,6 +52,7 @@ class Task:
     owner: ActiveJob
     shared: Shared | None = None
     chunks: list[tasks.ChunkOutline] = field(default_factory=list)
+    began: float = field(default_factory=time.monotonic)
 
     @property
     def kind(self) -> str:
@@ -71,6 +77,7 @@ class Scheduler:
         retries: How often a chunk that failed is tried again.
         keep_going: Whether other jobs go on after a failed one.
         restart: Whether to forget what earlier runs finished.
+        refused: Why jobs cannot be done, by their index.
         tally: How the jobs ended.
         feature_maps: How many sources' appearance was computed.
     """
@@ -83,6 +90,7 @@ class Scheduler:
     restart: bool
     listener: events.BatchListener
     signals: Signals
+    refused: Mapping[int, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
     feature_maps: int = 0
 
@@ -241,6 +249,8 @@ class Scheduler:
         work = WorkFolder(options.output, restart=self.restart)
         active = ActiveJob(job, work, *shared, ours)
         try:
+            if job.index in self.refused:
+                raise InputError(self.refused[job.index])
             # a run that was killed right after publishing left an output that is ours, unnoted
             published = not self.restart and was_published(options.output)
             for path in filter(None, (options.output, options.sheet)):
@@ -262,6 +272,9 @@ class Scheduler:
         place, task = self._running.pop(future)
         active = task.owner
         active.running -= 1
+        seconds = time.monotonic() - task.began
+        active.work_seconds += seconds
+        log.debug("worker %d, %s: %s, %.2f s", place, active.name, task.kind, seconds)
         try:
             result = future.result()
         except self.workers.lost_error:
@@ -336,10 +349,9 @@ class Scheduler:
     def _succeed(self, active: ActiveJob, posters: bool | None) -> None:
         outline, output = active.outline, active.job.options.output
         assert outline is not None
-        seconds = time.monotonic() - active.began
         self.state.record(
             {
-                **_facts(active, "done", seconds),
+                **_facts(active, "done"),
                 "frames": outline.frame_count,
                 "duration_seconds": outline.duration_seconds,
                 "renderer": outline.renderer,
@@ -353,7 +365,7 @@ class Scheduler:
         self._end(active)
         if outline.note:
             self.listener(events.JobNotice(active.name, outline.note))
-        self.listener(events.JobDone(active.name, output, outline.frame_count, seconds))
+        self.listener(events.JobDone(active.name, output, outline.frame_count, active.work_seconds))
 
     def _retry(self, task: Task, message: str) -> None:
         """Put a failed task back, unless it has failed too often."""
@@ -391,9 +403,8 @@ class Scheduler:
         active.error = message
         active.todo.clear()
         self.tally.failed += 1
-        seconds = time.monotonic() - active.began
         with suppress(OutputError):  # on a full disk; what is not noted is tried again all the same
-            self.state.record({**_facts(active, "failed", seconds), "error": message})
+            self.state.record({**_facts(active, "failed"), "error": message})
         self.listener(events.JobFailed(active.name, message))
         if not self.keep_going:
             self.halt()
@@ -417,7 +428,7 @@ class Scheduler:
                 shared.blobs.clear()
 
 
-def _facts(active: ActiveJob, status: str, seconds: float) -> dict[str, Any]:
+def _facts(active: ActiveJob, status: str) -> dict[str, Any]:
     options = active.job.options
     return {
         "output": str(options.output),
@@ -425,5 +436,6 @@ def _facts(active: ActiveJob, status: str, seconds: float) -> dict[str, Any]:
         "status": status,
         "source": options.source_words,
         "driver": str(options.driver),
-        "seconds": round(seconds, 3),
+        "seconds": round(active.work_seconds, 3),
+        "ended": datetime.now().astimezone().isoformat(timespec="seconds"),
     }

@@ -24,7 +24,7 @@ from motion_transfer.version import __version__
 NOT_DRAWN = ("workers", "restart", "force")
 """Options that decide nothing of an output."""
 
-TO_DO = "to do"
+DONE, TO_DO = "done", "to do"
 Record = dict[str, Any]
 """What became of a job, as a line of the journal."""
 
@@ -88,6 +88,7 @@ class BatchState:
         report: The folder of the report, which is for people to look at.
         scratch: Where local workers hand each other results.
         estimates: Where the IUV of drivers is kept that are raw pictures.
+        manifest: The file; paths in the report are told from its folder.
         records: Those of jobs by their output; the last one of each counts.
     """
 
@@ -96,7 +97,7 @@ class BatchState:
         self.report = output_root / extend_name(manifest.stem, ".report")
         self.scratch = self.folder / "scratch"
         self.estimates = (self.folder / "estimates").absolute()
-        self._manifest = manifest
+        self.manifest = manifest
         self._journal = Journal(self.folder / "journal.jsonl")
         self.records = {record["output"]: record for record in self._journal.read()}
 
@@ -105,7 +106,7 @@ class BatchState:
         """Be the only one at work on this manifest. Raises: OutputError if somebody else is."""
         with explain_disk_errors(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-        with locked(self.folder, f"manifest {self._manifest}"):
+        with locked(self.folder, f"manifest {self.manifest}"):
             self.records = {record["output"]: record for record in self._journal.repair()}
             yield
 
@@ -118,7 +119,7 @@ class BatchState:
     def status_of(self, output: Path) -> str:
         """Say `done`, `failed` or `to do`, as far as was noted and the output is still there."""
         word = self.records.get(str(output), {}).get("status", TO_DO)
-        return TO_DO if word == "done" and not output.exists() else word
+        return TO_DO if word == DONE and not output.exists() else word
 
     def picture_stem(self, output: Path) -> Path:
         """Say where a job's pictures lie; jobs are known by their outputs, in whatever order."""

@@ -170,6 +170,7 @@ def assemble(
     Returns: The output without its name yet, and whether it has pictures.
     """
     from motion_transfer.batch.report import write_posters
+    from motion_transfer.drawing.canvas import colour_iuv
     from motion_transfer.media.publish import explain_disk_errors
     from motion_transfer.render.engine import ContactSheet
     from motion_transfer.render.run import assemble as join
@@ -178,5 +179,7 @@ def assemble(
     sheet = ContactSheet(folder, len(run.plan.frames)) if options.sheet else None
     with explain_disk_errors(options.output):
         finished = join(options, run, folder, sheet)
-    posters = write_posters(options.source[0], finished, pictures)
+    middle = run.plan.first + len(run.plan.frames) // 2
+    driver = colour_iuv(next(run.open_people()[0].read(middle, middle + 1)))
+    posters = write_posters(options.source[0], driver, finished, pictures)
     return finished, posters

@@ -7,7 +7,14 @@ from typing import Any
 
 import click
 
-from motion_transfer.cli.options import FILE, SectionCommand, described_options, pair_words, section
+from motion_transfer.cli.options import (
+    FILE,
+    SectionCommand,
+    described_options,
+    events_option,
+    pair_words,
+    section,
+)
 from motion_transfer.cli.progress import choose_listener
 from motion_transfer.cli.terminal import tell
 from motion_transfer.option import options_from_words
@@ -20,7 +27,7 @@ output_option = section("Output")
 @described_options(AdaptOptions)
 @output_option("-o", "--output", type=FILE, required=True, help="A new .safetensors file.")
 @output_option("-q", "--quiet", is_flag=True, help="Say only errors.")
-@output_option("--json", "as_json", is_flag=True, help="Print events as JSON lines.")
+@events_option()
 def adapt(
     output: Path,
     garments: tuple[str, ...],

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
-from motion_transfer.cli.options import FILE, add_options
+from motion_transfer.cli.event_lines import VERSION
+from motion_transfer.cli.options import FILE, CommandGroup, add_options, events_option
 from motion_transfer.cli.progress import CountBar, JsonPrinter
-from motion_transfer.cli.terminal import printable, tell
+from motion_transfer.cli.terminal import counted, printable, tell
 
 if TYPE_CHECKING:
     from motion_transfer.batch.events import BatchEvent, BatchListener
@@ -20,20 +21,21 @@ if TYPE_CHECKING:
 SETTINGS = "Over a field of the manifest, or an option of all its jobs; may be repeated."
 manifest_options = add_options(
     [
-        click.argument("manifest", metavar="FILE", type=FILE),
+        click.argument("manifest", metavar="FILE|-", type=FILE),
         click.option("--set", "settings", multiple=True, metavar="K=V", help=SETTINGS),
     ]
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def batch() -> None:
     """Render a manifest of many jobs; go on where it was interrupted.
 
     \b
     mt batch validate jobs/shoot.yaml
     mt batch run jobs/shoot.yaml --workers 2 --set background=photo
+    make_jobs | mt batch run -
     """
 
 
@@ -50,7 +52,7 @@ def batch() -> None:
 )
 @click.option("--restart", is_flag=True, help="Forget what earlier runs finished.")
 @click.option("-q", "--quiet", is_flag=True, help="Say only errors.")
-@json_option
+@events_option()
 def run(jobs: str | None, quiet: bool, as_json: bool, **options: Any) -> int:
     """Render what is missing. Exit code: 0 all is done, 1 jobs failed, 130 interrupted."""
     from motion_transfer.batch.run import BatchOptions, run_batch
@@ -71,7 +73,7 @@ def validate(manifest: Path, settings: tuple[str, ...]) -> None:
 
     read = read_batch(manifest, settings)
     check_batch(read)
-    tell(f"{manifest}: {len(read.jobs)} jobs, all inputs are there")
+    tell(f"{read.name}: {counted(len(read.jobs), 'job')}, all inputs are there")
 
 
 @batch.command()
@@ -84,7 +86,8 @@ def status(manifest: Path, settings: tuple[str, ...], as_json: bool) -> None:
     read = read_batch(manifest, settings)
     counts = count_jobs(read)
     if as_json:
-        click.echo(json.dumps(counts))
+        words = {word.replace(" ", "_"): number for word, number in counts.items()}
+        click.echo(json.dumps({"version": VERSION, **words}))
         return
     click.echo(", ".join(f"{number} {word}" for word, number in counts.items()))
     for job in read.jobs:
@@ -112,7 +115,7 @@ def clean(manifest: Path, settings: tuple[str, ...]) -> None:
 
     read = read_batch(manifest, settings)
     count = read.state.clean([job.options.output for job in read.jobs])
-    click.echo(f"removed {count} work folders")
+    click.echo(f"removed {counted(count, 'work folder')}")
 
 
 def _reporter(bar: CountBar, *, quiet: bool) -> BatchListener:
@@ -139,17 +142,16 @@ def _reporter(bar: CountBar, *, quiet: bool) -> BatchListener:
             case events.JobNotice():
                 say(f"mt: note: {event.name}: {event.message}")
             case events.JobDone():
-                rate = event.frame_count / max(event.seconds, 1e-9)  # a coarse clock may say 0
-                result = f"wrote {event.output}: {event.frame_count} frames ({rate:.0f} frames/s)"
-                say(result, err=False)
+                frames = counted(event.frame_count, "frame")
+                say(f"wrote {event.output}: {frames} ({event.seconds:.1f} s of work)", err=False)
             case events.BatchStopping():
-                count = event.running_count
-                say(f"mt: finishing {count} running chunks; Ctrl-C now stops at once")
+                chunks = counted(event.running_count, "running chunk")
+                say(f"mt: finishing {chunks}; Ctrl-C now stops at once")
             case events.BatchFinished():
                 result = (
                     f"{event.done_count} done, {event.current_count} up to date,"
                     f" {event.failed_count} failed, {event.left_count} left; {event.seconds:.1f} s,"
-                    f" {event.feature_maps} sources prepared"
+                    f" {counted(event.feature_maps, 'source')} prepared"
                 )
                 say(result, err=False)
 

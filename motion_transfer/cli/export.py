@@ -9,7 +9,7 @@ import click
 
 from motion_transfer.cli.options import FILE, SectionCommand, described_options, section
 from motion_transfer.cli.progress import long_wait
-from motion_transfer.cli.terminal import tell
+from motion_transfer.cli.terminal import counted, tell
 from motion_transfer.drawing.export.options import ExportOptions
 from motion_transfer.option import options_from_words
 from motion_transfer.weights import DEFAULT_WEIGHTS
@@ -40,4 +40,4 @@ def export(weights: Path, quiet: bool, **words: Any) -> None:
         files = export_model(weights, options)
     if not quiet:
         size = sum(file.stat().st_size for file in files)
-        tell(f"wrote {options.output}: {len(files)} files, {size / 1e6:.1f} MB")
+        tell(f"wrote {options.output}: {counted(len(files), 'file')}, {size / 1e6:.1f} MB")

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import click
 
-from motion_transfer.cli.options import FILE
+from motion_transfer.cli.options import FILE, CommandGroup
 from motion_transfer.cli.progress import choose_listener, long_wait
 from motion_transfer.cli.terminal import tell
 from motion_transfer.media.iuv.formats import ChannelOrder
@@ -96,7 +96,7 @@ def inspect(
     _tell(describe_source(options, coverage, listener, force=force), as_json)
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def models() -> None:
     """The networks that find people in raw pictures, and those that look at faces.
 

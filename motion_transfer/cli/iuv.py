@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from motion_transfer.cli.options import FILE, SectionCommand, add_options, section
+from motion_transfer.cli.options import FILE, CommandGroup, SectionCommand, add_options, section
 from motion_transfer.cli.progress import CountBar
-from motion_transfer.cli.terminal import note, tell
+from motion_transfer.cli.terminal import counted, note, tell
 from motion_transfer.option import parse_rate
 
 input_option = section("Input")
@@ -51,7 +51,7 @@ OUTPUT_OPTIONS = [
 ]
 
 
-class IuvGroup(click.Group):
+class IuvGroup(CommandGroup):
     """A group whose command `estimate` needs not be named: `mt iuv me.jpg`."""
 
     default = "estimate"
@@ -134,11 +134,11 @@ def estimate(output: Path, fps: str | None, quiet: bool, **options: Any) -> None
     if seen.empty:
         shown = {"hold": "the frame before", "background": "background only"}[settings.missing]
         times = list_stretches(seen.empty, 0, report.frame_rate)
-        notes.append(f"nobody found in {seen.empty_count} frames, {shown}: {times}")
+        notes.append(f"nobody found in {counted(seen.empty_count, 'frame')}, {shown}: {times}")
     shots = f", {len(seen.shots)} shots" if len(seen.shots) > 1 else ""
     people = f", up to {seen.most_people} people" if seen.most_people > 1 else ""
     written = f"{output} and {name_alpha(output)}" if settings.alpha else output
-    _report(quiet, notes, f"wrote {written}: {seen.frame_count} frames{shots}{people}")
+    _report(quiet, notes, f"wrote {written}: {counted(seen.frame_count, 'frame')}{shots}{people}")
 
 
 @iuv.command(cls=SectionCommand)
@@ -161,7 +161,7 @@ def convert(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
     settings = ConvertOptions(output=output, frame_rate=_rate(fps), **options)
     with CountBar("converting", unit="frame", quiet=quiet) as bar:
         written, notes = convert_iuv(settings, bar.advance)
-    _report(quiet, notes, f"wrote {output}: {written.frame_count} frames")
+    _report(quiet, notes, f"wrote {output}: {counted(written.frame_count, 'frame')}")
 
 
 @iuv.command(cls=SectionCommand)
@@ -202,7 +202,7 @@ def repair(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
     _report(
         quiet,
         report.notes,
-        f"wrote {output}: {new.frame_count} frames; empty frames {old.empty_frames} ->"
+        f"wrote {output}: {counted(new.frame_count, 'frame')}; empty frames {old.empty_frames} ->"
         f" {new.empty_frames}, part flicker {old.parts:.2%} -> {new.parts:.2%}, UV flicker"
         f" {old.uv:.2f} -> {new.uv:.2f} of 255",
     )

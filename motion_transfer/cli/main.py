@@ -9,13 +9,21 @@ import signal
 import sys
 import traceback
 import warnings
+from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import click
 
-from motion_transfer.cli.terminal import printable
+from motion_transfer.cli.event_lines import write_line
+from motion_transfer.cli.log import show_log
+from motion_transfer.cli.options import FILE, CommandGroup
+from motion_transfer.cli.settings import Settings
+from motion_transfer.cli.terminal import note, printable
 from motion_transfer.errors import MotionTransferError, RenderError
+from motion_transfer.events import Failed
 from motion_transfer.version import __version__
 
 COMMANDS = {
@@ -48,6 +56,9 @@ OUT_OF_MEMORY = (
 LEAST_ADDRESS_SPACE_BYTES = 3 << 29
 """With two cores OpenBLAS waits without end at 1.2 GiB, and any run needs 1.7."""
 
+NO_ARGUMENTS: Any = getattr(click.exceptions, "NoArgsIsHelpError", ())
+"""Help is what a group without a command asks for; the first versions of click 8 print it."""
+
 INTERRUPTED = 130  # 128 and the signal's number, as shells have it
 TERMINATED = 143
 UNEXPECTED = 1
@@ -60,10 +71,23 @@ DEBUG = click.Option(
     help="After an error, show where in the program it arose.",
     callback=lambda context, _option, value: _remember(context, debug=value),
 )
-"""An option of every command, since it is added to one that has just failed."""
+VERBOSE = click.Option(
+    ["-v", "--verbose"],
+    is_flag=True,
+    expose_value=False,
+    help="Say on stderr what is chosen and found, with the time of each step.",
+    callback=lambda _context, _option, value: show_log() if value else None,
+)
+"""Options of every command: people add them to one that has just failed."""
+
+EPILOGUE = """\b
+Exit codes: 0 done, 1 failed, 2 what was given cannot be used, 130 Ctrl-C, 143 terminated.
+Options can stand in a file (--config) or in variables, such as MT_RUN_WORKERS=2.
+Both, --json, logs and URLs: docs/pipelines.md.
+"""
 
 
-class LazyGroup(click.Group):
+class LazyGroup(CommandGroup):
     """Knows its commands by name and imports only the one that is used: help is instant."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -76,17 +100,41 @@ class LazyGroup(click.Group):
         module = import_module(f"motion_transfer.cli.{HOMES.get(cmd_name, cmd_name)}")
         # `eval_` for `eval`: a function does not take a builtin's name
         command = getattr(module, cmd_name, None) or getattr(module, f"{cmd_name}_")
-        _add_debug(command)
+        _add_common(command)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name, command, rest = super().resolve_command(ctx, args)
+        if name and command and not set(ctx.help_option_names) & set(rest):  # help always comes
+            quiet = not {"-q", "--quiet"}.isdisjoint(rest)
+            settings = Settings(
+                *(name, command, ctx.params["config"], os.environ),
+                known=list(COMMANDS),
+                quiet=quiet,
+            )
+            ctx.default_map = settings.tree
+            ctx.ensure_object(dict)["settings"] = settings
+        return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]}, epilog=EPILOGUE
+)
+@click.option(
+    "--config",
+    type=FILE,
+    envvar="MT_CONFIG",
+    help="Defaults of options: TOML with a table for each command, such as [run]. Goes before the"
+    " command.",
+)
 @click.version_option(__version__, "-V", "--version", message="motion-transfer %(version)s")
-def cli() -> None:
+def cli(config: Path | None) -> None:
     """One photo of a person plus the motion of another becomes a video.
 
     \b
@@ -106,30 +154,62 @@ def main(arguments: list[str] | None = None) -> int:
     # torch's threads would spin while they wait, and take the cores from decoding and encoding;
     # read when torch is first imported, which no command has done yet
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-    settings = {"debug": False}
+    settings: dict[str, Any] = {"debug": False}
     try:
         with warnings.catch_warnings():
             if not sys.warnoptions:  # what libraries tell developers is not for users
                 warnings.simplefilter("ignore")
             code = cli.main(args=arguments, prog_name="mt", standalone_mode=False, obj=settings)
             sys.stdout.flush()
-    except click.ClickException as error:
+    except NO_ARGUMENTS as error:
         error.show()
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        click.echo("mt: interrupted, nothing half-written was left behind", err=True)
-        return INTERRUPTED
+        return _fail(settings, INTERRUPTED, ["interrupted, nothing half-written was left behind"])
     except Terminated:
-        click.echo("mt: terminated, nothing half-written was left behind", err=True)
-        return TERMINATED
+        return _fail(settings, TERMINATED, ["terminated, nothing half-written was left behind"])
     except Exception as error:
         if settings["debug"]:
             traceback.print_exc()
-        code, words = _explain(error)
-        for line in words:
-            click.echo(f"mt: {line}", err=True)
-        return code
+        if isinstance(error, click.ClickException):
+            return _fail(settings, error.exit_code, [_explain_usage(error, settings)])
+        return _fail(settings, *_explain(error))
     return code if isinstance(code, int) else 0  # click returns the code of an early exit
+
+
+def _fail(settings: dict[str, Any], code: int, words: list[str]) -> int:
+    """Say why a command ends, to people and to programs; give its exit code."""
+    for line in words:
+        click.echo(f"mt: {line}", err=True)
+    elsewhere, context = settings.get("settings"), settings.get("context")
+    if code == UNUSABLE and elsewhere and context:  # what nobody typed is easily forgotten
+        origins = [f"{flag} ({where})" for flag, where in elsewhere.origins(context)]
+        if origins:
+            note(f"set elsewhere: {', '.join(origins)}")
+    if settings.get("json"):
+        with suppress(OSError):  # it may be the very pipe that broke
+            click.echo(write_line(Failed(code, "\n".join(words))))
+            sys.stdout.flush()
+    return code
+
+
+def _explain_usage(error: click.ClickException, settings: dict[str, Any]) -> str:
+    """Say in one line what click says in three, and where help is."""
+    message = error.format_message()
+    context = getattr(error, "ctx", None)
+    if isinstance(error, click.NoSuchOption):
+        near = (error.possibilities or [""])[0]
+        message = f"no option {error.option_name}" + (f"; did you mean {near}?" if near else "")
+    elif isinstance(error, click.BadParameter) and error.param and context:
+        elsewhere = settings.get("settings")
+        origin = elsewhere.origin(context, error.param) if elsewhere else ""
+        message = f"{origin}: {error.message}" if origin else message
+    message = printable(" ".join(message.split())).rstrip(".")
+    message = message[0].lower() + message[1:] if message.partition(" ")[0].istitle() else message
+    if context is None:
+        return message
+    see = f"ee `{context.command_path} --help`"
+    return f"{message} S{see}" if message.endswith("?") else f"{message}; s{see}"
 
 
 def _explain(error: Exception) -> tuple[int, list[str]]:
@@ -182,17 +262,18 @@ def _check_address_space() -> None:
         )
 
 
-def _add_debug(command: click.Command) -> None:
+def _add_common(command: click.Command) -> None:
     if DEBUG not in command.params:
-        command.params.append(DEBUG)
+        command.params += [VERBOSE, DEBUG]
     if isinstance(command, click.Group):
         for inner in command.commands.values():
-            _add_debug(inner)
+            _add_common(inner)
 
 
 def _remember(context: click.Context, *, debug: bool) -> None:
     settings = context.find_root().ensure_object(dict)
     settings["debug"] = debug or settings.get("debug", False)
+    settings["context"] = context
 
 
 def entry_point() -> None:

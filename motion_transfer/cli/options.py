@@ -10,10 +10,25 @@ from typing import Any
 
 import click
 
-from motion_transfer.errors import InputError
-from motion_transfer.option import Option, list_options
+from motion_transfer.errors import InputError, did_you_mean
+from motion_transfer.option import Option, is_url, list_options
 
-FILE = click.Path(path_type=Path)
+
+class LocalPath(click.Path):
+    """A path on this machine."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if is_url(value):
+            self.fail(
+                f"{value!r} is a URL; only `mt run` and `mt batch run` fetch those", param, ctx
+            )
+        return super().convert(value, param, ctx)
+
+
+FILE = LocalPath()
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
@@ -22,6 +37,18 @@ SECOND_WORDS = {
     "partners": ("WHO", "Whose motion that is: an index from the left, or a box; as --person."),
 }
 """What goes with each photo of an option that has two flags, and its help."""
+
+
+class CommandGroup(click.Group):
+    """A group that says which command a mistyped one may have been."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        known = self.list_commands(ctx)
+        if args[0] not in known and not args[0].startswith("-") and not ctx.resilient_parsing:
+            raise click.UsageError(f"no command {args[0]!r}{did_you_mean(args[0], known)}", ctx)
+        return super().resolve_command(ctx, args)
 
 
 class SectionOption(click.Option):
@@ -51,7 +78,7 @@ class SectionCommand(click.Command):
                 formatter.write_dl(records)
 
 
-class SectionGroup(SectionCommand, click.Group):
+class SectionGroup(SectionCommand, CommandGroup):
     """A command with options under headings, below which other commands stand."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -93,6 +120,23 @@ class WordsGroup(WordsCommand, SectionGroup):
         if args[:1] and args[0] in self.commands:  # whose words are its own to spread
             return SectionGroup.parse_args(self, ctx, args)
         return super().parse_args(ctx, args)
+
+
+def events_option(heading: str = "Output") -> Decorator:
+    """Make a decorator that adds `--json`, by which a program hears of failures as well."""
+
+    def remember(context: click.Context, _parameter: click.Parameter, value: bool) -> bool:
+        context.find_root().ensure_object(dict)["json"] = value
+        return value
+
+    # eager: what is wrong with the other options is said in the same way
+    return section(heading)(
+        *("--json", "as_json"),
+        is_flag=True,
+        is_eager=True,
+        callback=remember,
+        help="Print events as JSON lines (docs/pipelines.md).",
+    )
 
 
 def described_options(options_class: type, *, required: bool = True) -> Decorator:

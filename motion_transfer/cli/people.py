@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from motion_transfer.cli.options import FILE, SectionCommand, section
+from motion_transfer.cli.options import FILE, CommandGroup, SectionCommand, section
 from motion_transfer.cli.progress import CountBar, long_wait
-from motion_transfer.cli.terminal import note, tell
+from motion_transfer.cli.terminal import counted, note, tell
 from motion_transfer.option import parse_rate, parse_size
 
 SHARE = click.FloatRange(0, 1)
@@ -24,7 +24,7 @@ picture_option = section("Pictures")
 output_option = section("Output")
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def people() -> None:
     """Synthetic people: photos with exact IUV, drivers from motion, and motion from clips.
 
@@ -97,7 +97,7 @@ def drive(
         driver = record_motion(settings, output, force=force, done=bar.advance)
     if not quiet:
         seconds = float(driver.frame_count / driver.frame_rate)
-        click.echo(f"{output}: {driver.frame_count} frames, {seconds:.2f} s of {motion}")
+        click.echo(f"{output}: {counted(driver.frame_count, 'frame')}, {seconds:.2f} s of {motion}")
 
 
 @people.command(cls=SectionCommand)
@@ -134,10 +134,10 @@ def track(source: Path, quiet: bool, **options: Any) -> None:
     if unseen := found.unseen:
         count = sum(stop - start for start, stop in unseen)
         times = list_stretches(unseen, 0, found.frame_rate)
-        note(f"nobody found in {count} frames, which are filled in: {times}")
+        note(f"nobody found in {counted(count, 'frame')}, filled in: {times}")
     seconds = float(len(found) / found.frame_rate)
     shots = f", {len(found.shots)} shots" if len(found.shots) > 1 else ""
-    tell(f"wrote {settings.output}: {len(found)} frames, {seconds:.2f} s{shots}")
+    tell(f"wrote {settings.output}: {counted(len(found), 'frame')}, {seconds:.2f} s{shots}")
 
 
 @people.command(cls=SectionCommand)
@@ -195,8 +195,8 @@ def render(quiet: bool, size: str, assets: Path | None, **options: Any) -> None:
         added = write_album(settings, bar.advance)
     if not quiet:
         there = f" ({settings.count - added} were there)" if added < settings.count else ""
-        who = "person" if added == 1 else "people"
-        click.echo(f"{settings.out}: {added} {who} added{there}, {settings.views} photos each")
+        photos = counted(settings.views, "photo")
+        click.echo(f"{settings.out}: {counted(added, 'person')} added{there}, {photos} each")
 
 
 def prepare_body_model(quiet: bool, assets: Path | None = None) -> None:

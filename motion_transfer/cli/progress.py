@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
-from functools import partial
-from pathlib import Path
 from typing import Any, Self
 
 import click
-from tqdm import tqdm
 
-from motion_transfer.cli.terminal import note, tell
+from motion_transfer.cli.bars import Bar, is_interactive, open_bar
+from motion_transfer.cli.event_lines import AnyEvent, write_line
+from motion_transfer.cli.terminal import counted, note, tell
 from motion_transfer.drawing.renderers import RENDERERS
 from motion_transfer.events import Event, Finished, FramesDone, Listener, Notice, Stage
 
@@ -28,35 +24,30 @@ STAGE_WORDS = {
     "scan": "reading driver",
     "render": "rendering",
 }
-_open_bar = partial(tqdm, leave=False, dynamic_ncols=True)
 
 
 def choose_listener(*, quiet: bool, as_json: bool) -> Listener:
-    """Choose JSON lines, nothing, or a bar and sentences; the bar is for terminals only."""
-    if as_json:
-        return JsonPrinter()
-    return Reporter(show_bar=sys.stderr.isatty(), quiet=quiet)
+    """Choose JSON lines, nothing, or progress and sentences."""
+    return JsonPrinter() if as_json else Reporter(quiet=quiet)
 
 
 class JsonPrinter:
-    """Prints events of any kind on stdout, one JSON object a line, whose `event` names the kind."""
+    """Prints events of any kind on stdout, one JSON object a line, see `event_lines`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()  # events come from any thread
 
-    def __call__(self, event: Any) -> None:
-        fields = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(event).items()}
+    def __call__(self, event: AnyEvent) -> None:
         with self._lock:
-            click.echo(json.dumps({"event": type(event).__name__.lower(), **fields}))
+            click.echo(write_line(event))
 
 
 class Reporter:
     """Shows the progress of a run on stderr, and its result on stdout."""
 
-    def __init__(self, *, show_bar: bool, quiet: bool) -> None:
-        self._show_bar = show_bar and not quiet
+    def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
-        self._bar: tqdm | None = None
+        self._bar: Bar | None = None
         self._lock = threading.Lock()
 
     def __call__(self, event: Event) -> None:
@@ -64,14 +55,14 @@ class Reporter:
             match event:
                 case Stage():
                     self._close()
-                    if self._show_bar:
+                    if not self._quiet:
                         words = STAGE_WORDS.get(event.name, event.name)
                         unit = "step" if event.name == "adapt" else "frame"
-                        self._bar = _open_bar(total=event.frame_count, desc=words, unit=unit)
+                        self._bar = open_bar(words, unit=unit, total=event.frame_count)
                 case FramesDone():
                     if self._bar is not None:
                         self._bar.update(event.frame_count)
-                        if self._bar.n >= self._bar.total:
+                        if self._bar.n >= (self._bar.total or 0):
                             self._close()
                 case Notice() if not self._quiet:
                     self._close()
@@ -87,25 +78,33 @@ class Reporter:
 
 def describe(event: Finished) -> str:
     """Write the one line that a person reads when all is done."""
-    rate = event.frame_count / event.render_seconds
+    # of one frame nobody asks how many there are a second
+    rate = f", {speed(event)} while rendering" if event.frame_count > 1 else ""
     return (
-        f"wrote {event.output}: {event.frame_count} frames, {event.duration_seconds:.2f} s"
-        f" ({RENDERERS[event.renderer].report}; {event.wall_seconds:.1f} s in all,"
-        f" {rate:.0f} frames/s while rendering)"
+        f"wrote {event.output}: {counted(event.frame_count, 'frame')},"
+        f" {event.duration_seconds:.2f} s ({RENDERERS[event.renderer].report};"
+        f" {event.wall_seconds:.1f} s in all{rate})"
     )
 
 
+def speed(event: Finished) -> str:
+    """Say how fast it was drawn, as a rate, or by the frame where that is slow."""
+    seconds = max(event.render_seconds, 1e-9) / event.frame_count  # a coarse clock may say 0
+    return f"{1 / seconds:.0f} frames/s" if seconds <= 0.5 else f"{seconds:.1f} s a frame"
+
+
 class CountBar:
-    """A bar for work that is counted; nothing where stderr is no terminal."""
+    """Progress of work that is counted."""
 
     def __init__(self, words: str, *, unit: str, quiet: bool, total: int | None = None) -> None:
-        self._show = sys.stderr.isatty() and not quiet
-        self._settings: dict[str, Any] = {"desc": words, "unit": unit, "total": total}
-        self._bar: tqdm | None = None
+        self._show = not quiet
+        self._words = words
+        self._settings: dict[str, Any] = {"unit": unit, "total": total}
+        self._bar: Bar | None = None
 
     def __enter__(self) -> Self:
         if self._show:
-            self._bar = _open_bar(**self._settings)
+            self._bar = open_bar(self._words, **self._settings)
         return self
 
     def __exit__(self, *_error: object) -> None:
@@ -122,7 +121,7 @@ class CountBar:
 @contextmanager
 def long_wait(words: str, *, quiet: bool) -> Iterator[None]:
     """Say what is waited for, and on a terminal for how long already, while the block runs."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or not is_interactive():
         note(words, quiet=quiet)
         yield
         return

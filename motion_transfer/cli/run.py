@@ -12,6 +12,7 @@ from motion_transfer.cli.options import (
     FILE,
     SectionCommand,
     described_options,
+    events_option,
     pair_words,
     section,
 )
@@ -25,7 +26,7 @@ output_option = section("Output")
 @click.command(cls=SectionCommand)
 @described_options(RenderOptions)
 @output_option("-q", "--quiet", is_flag=True, help="Say only errors.")
-@output_option("--json", "as_json", is_flag=True, help="Print events as JSON lines.")
+@events_option()
 def run(
     garments: tuple[str, ...],
     garment_parts: tuple[str, ...],
@@ -50,12 +51,14 @@ def run(
     mt run --source me.png --driver me_IUV.png --garment dress.png \\
            --garment-parts torso,upper-legs --background photo -o dressed.png
     """
+    from motion_transfer.render.remote import local_run
     from motion_transfer.render.run import run as render
 
     words["garments"] = pair_words(garments, garment_parts, "garment", "parts")
     words["partners"] = pair_words(partners, partner_person, "partner", "person")
-    options = options_from_words(RenderOptions, words)
-    render(options, choose_listener(quiet=quiet, as_json=as_json))
+    listener = choose_listener(quiet=quiet, as_json=as_json)
+    with local_run(RenderOptions, words, listener) as (local, listen):
+        render(options_from_words(RenderOptions, local), listen)
 
 
 @click.command()
@@ -75,7 +78,7 @@ def run(
 @click.option("--compare/--plain", default=True, help="Source, IUV and result, or the result only.")
 @click.option("--force", is_flag=True, help="Replace an existing output.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-@click.option("--json", "as_json", is_flag=True, help="Print events as JSON lines.")
+@events_option("Other")
 def demo(
     output: Path, photo_alone: bool, compare: bool, force: bool, quiet: bool, as_json: bool
 ) -> None:

@@ -7,7 +7,14 @@ from typing import Any
 
 import click
 
-from motion_transfer.cli.options import FILE, SectionCommand, described_options, pair_words, section
+from motion_transfer.cli.options import (
+    FILE,
+    CommandGroup,
+    SectionCommand,
+    described_options,
+    pair_words,
+    section,
+)
 from motion_transfer.cli.progress import choose_listener
 from motion_transfer.cli.terminal import tell
 from motion_transfer.option import options_from_words
@@ -16,7 +23,7 @@ from motion_transfer.render.options import KeepOptions
 output_option = section("Output")
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def source() -> None:
     """Keep a person in one file: encode once, render often, also on another machine.
 

@@ -16,6 +16,14 @@ def printable(words: str) -> str:
     )
 
 
+PLURALS = {"person": "people"}
+
+
+def counted(count: int, thing: str) -> str:
+    """Say how many: `1 frame`, `2 frames`."""
+    return f"{count} {thing if count == 1 else PLURALS.get(thing, f'{thing}s')}"
+
+
 def note(words: str, *, quiet: bool = False) -> None:
     """Say something that a person should know, though the work goes on."""
     if not quiet:

@@ -10,7 +10,6 @@ Light: needs no network's library.
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
 import sys
 import tempfile
@@ -20,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motion_transfer.errors import FetchError, InputError
-from motion_transfer.media.files import check_readable
+from motion_transfer.media.files import cache_folder, check_readable
 from motion_transfer.media.publish import explain_disk_errors, publish
 
 DOWNLOAD = (
@@ -125,14 +124,8 @@ FACE_FILES = (FACE_DETECTOR, FACE_NETWORK)
 
 
 def models_folder() -> Path:
-    """Name the folder of the files: `$MT_CACHE_DIR/models`, or `motion-transfer/models` in the
-    user's cache (`$XDG_CACHE_HOME`, or `~/.cache`)."""
-    if chosen := os.environ.get("MT_CACHE_DIR"):
-        return Path(chosen).expanduser() / "models"
-    cache = os.environ.get("XDG_CACHE_HOME", "")
-    # the XDG specification says to ignore relative paths
-    base = Path(cache) if Path(cache).is_absolute() else Path.home() / ".cache"
-    return base / "motion-transfer" / "models"
+    """Name the folder of the files: `models` in the cache, see `cache_folder`."""
+    return cache_folder() / "models"
 
 
 def is_there(file: ModelFile) -> bool:

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 
 from motion_transfer.errors import InputError
+
+
+def cache_folder() -> Path:
+    """Name the folder of what is kept between runs: `$MT_CACHE_DIR`, or `motion-transfer` in the
+    user's cache (`$XDG_CACHE_HOME`, or `~/.cache`)."""
+    if chosen := os.environ.get("MT_CACHE_DIR"):
+        return Path(chosen).expanduser()
+    cache = os.environ.get("XDG_CACHE_HOME", "")
+    # the XDG specification says to ignore relative paths
+    base = Path(cache) if Path(cache).is_absolute() else Path.home() / ".cache"
+    return base / "motion-transfer"
 
 
 def check_readable(path: Path, what: str, *, folder: bool = False) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +12,7 @@ from pathlib import Path
 from motion_transfer.errors import InputError
 
 LISTED_GAPS = 5
-"""How many missing numbers a message spells out; a line holds no more."""
+"""How many missing numbers, or names, a message spells out; a line holds no more."""
 
 MOST_GAPS = 1_000_000
 """How many missing numbers are filled: nine hours of frames. More are no numbers of frames."""
@@ -42,6 +42,25 @@ def list_files(folder: Path) -> list[Path]:
     """List what a folder shows, in natural order of the names."""
     seen = (file for file in folder.iterdir() if not file.name.startswith("."))
     return sorted(seen, key=lambda file: natural_key(file.name))
+
+
+def describe_rest(
+    folder: Path, frames: Sequence[Path], beside: Collection[Path] = ()
+) -> tuple[str, ...]:
+    """Say what lies in a folder and is not read; nothing where there is nothing else.
+
+    Args:
+        frames: What is read, in order.
+        beside: What belongs to that, and is no news.
+    Returns: One sentence, or none.
+    """
+    known = {*frames, *beside}
+    rest = [f"{item.name}{'/' * item.is_dir()}" for item in list_files(folder) if item not in known]
+    if not rest:
+        return ()
+    read = frames[0].name if len(frames) == 1 else f"{frames[0].name} to {frames[-1].name}"
+    more = f" and {len(rest) - LISTED_GAPS} more" if len(rest) > LISTED_GAPS else ""
+    return (f"of {folder}, {read} is read, and not {', '.join(rest[:LISTED_GAPS])}{more}",)
 
 
 def number_frames(names: Sequence[str], what: str) -> Numbering:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 import tomllib
 from collections import Counter
 from dataclasses import dataclass, field
@@ -89,12 +90,27 @@ def read_text(path: Path, what: str) -> str:
     check_readable(path, what)
     if path.stat().st_size > LARGEST_BYTES:
         raise InputError(f"{what} {path} is larger than {LARGEST_BYTES >> 20} MiB; split it")
-    data = read_bytes(path, what)
+    return _decode(read_bytes(path, what), what, str(path))
+
+
+def read_stdin(what: str) -> str:
+    """Read a small text from standard input, as `read_text` from a file. Raises: InputError."""
+    data = sys.stdin.buffer.read(LARGEST_BYTES + 1)
+    if len(data) > LARGEST_BYTES:
+        raise InputError(
+            f"{what} on standard input is larger than {LARGEST_BYTES >> 20} MiB; split it"
+        )
+    if not data.strip():
+        raise InputError(f"{what}: nothing came on standard input")
+    return _decode(data, what, "standard input")
+
+
+def _decode(data: bytes, what: str, where: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}:{line}: {what} is not text in UTF-8; save it as that") from None
+        raise InputError(f"{where}:{line}: {what} is not text in UTF-8; save it as that") from None
 
 
 def parse_structured(text: str, suffix: str, where: str) -> Structured:

@@ -241,7 +241,10 @@ def _describe_iuv(path: Path, order: str | None) -> Facts:
     if warning := blends.warn("it"):
         facts["warning"] = warning
     facts["missing numbers"] = list(stream.gaps) or "none"
-    facts["people a frame"] = {f"{n} people": f"{f} frames" for n, f in sorted(crowd.items())}
+    facts["people a frame"] = {
+        "1 person" if n == 1 else f"{n} people": "1 frame" if f == 1 else f"{f} frames"
+        for n, f in sorted(crowd.items())
+    }
     shares = pixels[1:] / max(1, pixels[1:].sum())
     facts["parts (share of the body's pixels)"] = {
         PART_NAMES[part]: f"{share:.1%}" for part, share in enumerate(shares, 1) if share

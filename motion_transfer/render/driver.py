@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import time
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -35,6 +37,8 @@ from motion_transfer.render.workers import WARM
 
 if TYPE_CHECKING:
     from motion_transfer.render.picture_driver import PictureDriver
+
+log = logging.getLogger(__name__)
 
 
 class DriverIuv(Protocol):
@@ -197,7 +201,9 @@ def scan_driver(
     Raises: InputError, also for a driver that changes meanwhile; IuvFileError naming the frame that
         is broken.
     """
+    began = time.perf_counter()
     driver = open_driver(options, folder, listener)
+    log.debug("opened driver %s in %.2f s", options.driver, time.perf_counter() - began)
     chosen = frame_range(options.frames, driver.frame_count, str(options.driver))
     if not driver.pictures and names_file(options.driver):  # what is drawn here is not blended
         blends = look_for_blends(driver.reader, chosen)
@@ -220,6 +226,7 @@ def scan_driver(
         elsewhere=elsewhere,
     )
     driver.inputs.check()
+    log.debug("looked through %d frames, %.2f s in all", len(chosen), time.perf_counter() - began)
     return driver.scan_of(chosen, seen)
 
 

@@ -29,6 +29,11 @@ CHUNKS_AT_ONCE = 2  # where others draw: while one chunk ends, the next one's ba
 STOP_SECONDS = 0.2  # how soon a thread that waits for another process heeds a stop
 
 SHEET_FRAMES, SHEET_COLUMNS = 12, 4
+SHEET_LINE_PX, SHEET_GAP_PX, SHEET_TEXT_SCALE = 20, 8, 0.45
+SHEET_GREY = 96
+"""Of the sheet between its pictures: most people are drawn on white, and some on black."""
+
+SHEET_EDGE: Any = {"mode": "constant", "constant_values": SHEET_GREY}
 THUMBNAIL_PX = 320  # the longer side: twelve of them fit a screen
 
 
@@ -142,12 +147,23 @@ class ContactSheet:
 
     def picture(self) -> UInt8[np.ndarray, "H W 3"]:
         """Lay out the sheet; every wanted frame must have been offered."""
-        images = [read_photo(self._path(index)).rgb for index in sorted(self._wanted)]
-        blank = np.full_like(images[0], 255)
-        columns = min(SHEET_COLUMNS, len(images))
-        images += [blank] * (-len(images) % columns)
-        rows = [np.hstack(images[i : i + columns]) for i in range(0, len(images), columns)]
-        return np.vstack(rows)
+        cells = [
+            _label(read_photo(self._path(index)).rgb, f"frame {index}")
+            for index in sorted(self._wanted)
+        ]
+        columns = min(SHEET_COLUMNS, len(cells))
+        cells += [np.full_like(cells[0], SHEET_GREY)] * (-len(cells) % columns)
+        rows = [np.hstack(cells[i : i + columns]) for i in range(0, len(cells), columns)]
+        return np.pad(np.vstack(rows), ((SHEET_GAP_PX, 0), (SHEET_GAP_PX, 0), (0, 0)), **SHEET_EDGE)
 
     def _path(self, index: int) -> Path:
         return self._folder / f"thumbnail_{index:06d}.png"
+
+
+def _label(picture: UInt8[np.ndarray, "h w 3"], words: str) -> UInt8[np.ndarray, "H W 3"]:
+    """Put words below a picture, and a gap below and beside both."""
+    below, beside = SHEET_LINE_PX + SHEET_GAP_PX, SHEET_GAP_PX
+    cell = np.pad(picture, ((0, below), (0, beside), (0, 0)), **SHEET_EDGE)
+    place = (2, picture.shape[0] + SHEET_LINE_PX - 5)
+    font, white = cv2.FONT_HERSHEY_SIMPLEX, (255, 255, 255)
+    return cv2.putText(cell, words, place, font, SHEET_TEXT_SCALE, white, 1, cv2.LINE_AA)

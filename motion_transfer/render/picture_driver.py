@@ -7,6 +7,7 @@ With `--fit-body` the driver's body gets the source's proportions on the way.
 from __future__ import annotations
 
 import json
+import logging
 import uuid
 from contextlib import closing
 from dataclasses import asdict, dataclass
@@ -42,6 +43,9 @@ from motion_transfer.render.plan import frame_range
 
 ORDER: ChannelOrder = "iuv"
 """Of the channels of the video that is kept."""
+
+log = logging.getLogger(__name__)
+
 
 MEASURED_FRAMES = 60
 """Of the driver: the first ones that show its person. Two seconds hold several poses; a single
@@ -89,6 +93,8 @@ def estimate_driver(
     if driver is None:
         driver = _make(options, iuv, key, listener, inputs)
         _write(driver, facts)
+    else:
+        log.debug("IUV of %s is there from an earlier run: %s", options.driver, iuv)
     for note in driver.notes:
         listener(Notice(note))
     return driver

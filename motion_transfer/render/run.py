@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import pickle
 import time
 from collections.abc import Callable
@@ -41,6 +42,8 @@ from motion_transfer.render.engine import ContactSheet, Engine
 from motion_transfer.render.options import OutputOptions, RenderOptions
 from motion_transfer.render.plan import Chunk, describe_missing
 from motion_transfer.render.provenance import mark_with
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -89,8 +92,10 @@ def run(options: RenderOptions, listener: Listener = ignore) -> RenderReport:
         composed = prepare(options, work, listener, crew)
         prepared = composed.prepared
         render_began = time.perf_counter()
+        log.debug("prepared in %.2f s", render_began - began)
         _render(options, composed, work, listener, crew)
     ended = time.perf_counter()
+    log.debug("rendered and written in %.2f s", ended - render_began)
     plan, (width, height) = prepared.plan, prepared.canvas.size
     report = RenderReport(
         output=options.output,
@@ -282,6 +287,12 @@ def _render(
     listener(Started(prepared.recipe.name, frame_count, width, height, rate))
     sheet = ContactSheet(work.path, frame_count) if options.sheet else None
     missing = missing_chunks(prepared, work)
+    count = len(prepared.plan.chunks)
+    log.debug(
+        "%d of %d chunks of %s to render with %s on %d threads, %s",
+        *(len(missing), count, options.driver, prepared.recipe.name, options.worker_count),
+        prepared.output_format.codec_name,
+    )
     done = frame_count - sum(chunk.stop - chunk.start for chunk in missing)
     if done:
         listener(Notice(f"{done} of {frame_count} frames were finished before; going on there"))

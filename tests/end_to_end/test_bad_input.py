@@ -229,11 +229,14 @@ def test_bad_input(studio, draft, case: str) -> None:
 
 
 USAGE = {
-    "no source": (["run", "--driver", "a", "-o", "b.mp4"], "Missing option '--source'"),
-    "no output": (["run", "--source", "a", "--driver", "b"], "Missing option '-o' / '--output'"),
+    "no source": (["run", "--driver", "a", "-o", "b.mp4"], "missing option '--source'"),
+    "no output": (["run", "--source", "a", "--driver", "b"], "missing option '-o' / '--output'"),
     "crf no number": (["run", "--crf", "good"], "'good' is not a valid integer"),
-    "unknown option": (["run", "--sauce", "a"], "No such option"),
-    "unknown command": (["walk"], "No such command 'walk'"),
+    "unknown option": (
+        ["run", "--sauce", "a"],
+        "no option --sauce; did you mean --source? See `mt run --help`",
+    ),
+    "unknown command": (["rum"], "no command 'rum'; did you mean run? See `mt --help`"),
     "unknown topic": (["info", "hats"], "'hats' is not one of"),
 }
 
@@ -243,9 +246,9 @@ def test_bad_usage(mt, case: str) -> None:
     arguments, reason = USAGE[case]
     result = mt(*arguments)
     assert result.code == 2
-    assert result.err.startswith("Usage: mt ")
+    assert result.err.startswith("mt: ")
     assert reason in result.err
-    assert "Traceback" not in result.err
+    assert result.err.count("\n") == 1
 
 
 def test_broken_weights(studio, mt, checkpoint: Path) -> None:

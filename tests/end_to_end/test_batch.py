@@ -108,12 +108,12 @@ def killed_after(process: subprocess.Popen[str], count: int, finished: Counter[s
 def note_finished(told: list[dict], finished: Counter[str]) -> None:
     """Count each job's finished frames; of what was finished before, nothing is done twice."""
     for event in told:
-        if event["event"] == "jobplanned":
+        if event["event"] == "job-planned":
             assert event["done_count"] >= finished[event["name"]]
             finished[event["name"]] = event["done_count"]
-        if event["event"] == "jobframes":
+        if event["event"] == "job-frames":
             finished[event["name"]] += event["frame_count"]
-        if event["event"] == "jobdone":
+        if event["event"] == "job-done":
             finished[event["name"]] = EVERYTHING
 
 
@@ -129,7 +129,7 @@ def kill_after(path: Path, frames_events: int, number: int, *more: object) -> in
         assert process.stdout is not None
         count = 0
         for line in process.stdout:
-            count += json.loads(line)["event"] == "jobframes"
+            count += json.loads(line)["event"] == "job-frames"
             if count == frames_events:
                 process.send_signal(number)
                 count = -1_000_000
@@ -141,7 +141,7 @@ def test_workers_and_kills_change_nothing_and_sources_are_shared(studio, shoot: 
     assert (code, errors) == (0, "")
     whole = contents(studio.folder / "out")
     assert list(whole) == ["anna_walk.mp4", "anna_wave.mp4", "ben_walk.mp4", "ben_wave.mp4"]
-    finished = named(told, "batchfinished")[0]
+    finished = named(told, "batch-finished")[0]
     assert (finished["done_count"], finished["feature_maps"]) == (4, 2)
 
     other = "output_root=other"
@@ -168,10 +168,10 @@ def test_workers_and_kills_change_nothing_and_sources_are_shared(studio, shoot: 
     assert single.read_bytes() == whole["anna_walk.mp4"]
 
     code, told, _ = run(shoot)  # nothing is to do
-    assert named(told, "batchfinished")[0]["current_count"] == 4
+    assert named(told, "batch-finished")[0]["current_count"] == 4
     studio.source("ben", colours={(2,): (9, 9, 9)})
     code, told, _ = run(shoot, "--workers", 1)
-    finished = named(told, "batchfinished")[0]
+    finished = named(told, "batch-finished")[0]
     assert (code, finished["done_count"], finished["current_count"]) == (0, 2, 2)
     assert contents(studio.folder / "out")["ben_walk.mp4"] != whole["ben_walk.mp4"]
 
@@ -191,11 +191,11 @@ def test_jobs_fail_alone_and_go_on_when_mended(studio, shoot: Path) -> None:
     (studio.folder / "out/taken.mp4").write_text("mine")
     code, told, _ = run(path, "--workers", 1)
     assert code == 1
-    reasons = {event["name"]: event["message"] for event in named(told, "jobfailed")}
+    reasons = {event["name"]: event["message"] for event in named(told, "job-failed")}
     assert "gone.png does not exist" in reasons["gone.mp4"]
     assert "frame 1" in reasons["damaged.mp4"]
     assert "exists already" in reasons["taken.mp4"]
-    assert [event["name"] for event in named(told, "jobdone")] == ["good.mp4"]
+    assert [event["name"] for event in named(told, "job-done")] == ["good.mp4"]
     assert (studio.folder / "out/taken.mp4").read_text() == "mine"
 
     page = (studio.folder / "out/shoot.report/index.html").read_text()
@@ -207,7 +207,7 @@ def test_jobs_fail_alone_and_go_on_when_mended(studio, shoot: Path) -> None:
     (damaged / "frame_1_IUV.png").write_bytes(good)
     studio.source("gone")
     code, told, _ = run(path, "--workers", 1, "--jobs", ":2")
-    assert (code, len(named(told, "jobdone"))) == (0, 2)
+    assert (code, len(named(told, "job-done"))) == (0, 2)
 
 
 def test_held_frames_are_as_in_a_single_run_and_reported(studio) -> None:
@@ -223,7 +223,7 @@ def test_held_frames_are_as_in_a_single_run_and_reported(studio) -> None:
     code, told, _ = run(path, "--workers", 1)
     assert code == 0
     note = f"nobody found in 5 of {CHUNK_FRAMES + 4} frames, the frame before: 0:00.00-0:00.03"
-    assert [e["name"] for e in named(told, "jobnotice") if note in e["message"]] == [
+    assert [e["name"] for e in named(told, "job-notice") if note in e["message"]] == [
         "a.mp4",
         "b.mp4",
     ]
@@ -248,7 +248,7 @@ def test_a_worker_that_is_killed_fails_nothing_at_first(studio, shoot: Path) -> 
         assert process.stdout is not None
         killed: list[int] = []
         for line in process.stdout:
-            if json.loads(line)["event"] == "jobplanned":
+            if json.loads(line)["event"] == "job-planned":
                 killed = workers_of(process.pid)
                 for pid in killed:
                     os.kill(pid, signal.SIGKILL)
@@ -275,14 +275,14 @@ def test_ctrl_c_finishes_running_chunks(studio, shoot: Path) -> None:
     assert kill_after(shoot, 1, signal.SIGINT) == 130
     code, told, _ = run(shoot, "--workers", 2)
     assert code == 0
-    assert any(event["done_count"] for event in named(told, "jobplanned"))
+    assert any(event["done_count"] for event in named(told, "job-planned"))
 
 
 def test_a_second_ctrl_c_stops_at_once(studio, shoot: Path) -> None:
     with start(shoot, "--workers", 2) as process:
-        follow(process, "jobframes")
+        follow(process, "job-frames")
         os.killpg(process.pid, signal.SIGINT)
-        follow(process, "batchstopping")
+        follow(process, "batch-stopping")
         os.killpg(process.pid, signal.SIGINT)
         _, errors = process.communicate(timeout=300)
     assert process.returncode == 130
@@ -294,7 +294,7 @@ def test_a_second_ctrl_c_stops_at_once(studio, shoot: Path) -> None:
     assert not (root / ".shoot.batch/scratch").exists()
     early = contents(root)
     code, told, _ = run(shoot, "--workers", 2)
-    assert (code, named(told, "jobfailed")) == (0, [])
+    assert (code, named(told, "job-failed")) == (0, [])
     assert early.items() <= contents(root).items()
     assert len(contents(root)) == 4
 
@@ -309,7 +309,7 @@ def test_the_network_draws_the_same_with_any_number_of_workers(studio, shoot, ch
         root = f"output_root=with{count}"
         code, told, errors = run(shoot, "--workers", count, "--set", root, *network)
         assert (code, errors) == (0, "")
-        assert named(told, "batchfinished")[0]["feature_maps"] == 1
+        assert named(told, "batch-finished")[0]["feature_maps"] == 1
         drawn.append(contents(studio.folder / f"with{count}"))
     assert list(drawn[0]) == ["anna_walk.mp4", "anna_wave.mp4"]
     assert drawn[0] == drawn[1] == drawn[2]

@@ -207,7 +207,7 @@ def test_missing_results_are_listed_or_their_pairs_skipped_for_all(
 
 
 BAD = {
-    "no output": (["--pairs", "pairs.csv"], "Missing option '-o'"),
+    "no output": (["--pairs", "pairs.csv"], "missing option '-o'"),
     "no pairs": (["-o", "out"], "give one of --pairs, --clips and --protocol"),
     "both": (
         ["-o", "out", "--pairs", "pairs.csv", "--clips", "."],

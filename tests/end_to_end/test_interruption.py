@@ -55,7 +55,7 @@ def wait_for(process: subprocess.Popen[str], stage: str) -> None:
         event = json.loads(line)
         if event["event"] == "stage":
             current = event["name"]
-        if event["event"] == "framesdone" and current == stage:
+        if event["event"] == "frames-done" and current == stage:
             return
     raise AssertionError(f"the run ended before the stage {stage}: {process.communicate()[1]}")
 

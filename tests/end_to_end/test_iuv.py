@@ -59,7 +59,7 @@ def test_a_photo(tmp_path: Path, mt, red) -> None:
     Image.fromarray(np.rot90(somebody())).save(photo, exif=exif)
     outcome = mt("iuv", photo, "-o", tmp_path / "me_IUV.png", *red)
     assert (outcome.code, outcome.err) == (0, "")
-    assert "me_IUV.png: 1 frames" in outcome.out
+    assert "me_IUV.png: 1 frame\n" in outcome.out
     (iuv,) = frames_of(tmp_path / "me_IUV.png")
     assert iuv.shape == (*SIZE, 3)
     assert set(np.unique(iuv[12:84, 10:40, 0])) == {2, 10}
@@ -115,7 +115,7 @@ def test_alpha_is_written_beside(tmp_path: Path, mt, red, output: str, alpha: st
     words = ["iuv", source, "-o", out / output, "--alpha", *red, "--missing", "hold"]
     outcome = mt(*words)
     assert outcome.code == 0, outcome.err
-    assert f"{output} and {out / alpha}: {len(frames)} frames" in outcome.out
+    assert f"{output} and {out / alpha}: {len(frames)} frame" in outcome.out
     assert sorted(p.name for p in out.iterdir()) == sorted([output, alpha])
     found = alpha_of(out / alpha)
     assert len(found) == len(frames)

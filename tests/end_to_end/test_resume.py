@@ -104,7 +104,7 @@ def interrupt_midway(studio, output: Path) -> int:
             event = json.loads(line)
             stage = event.get("name", stage)
             notices.append(event.get("message", ""))
-            if event["event"] == "framesdone" and stage == "render":
+            if event["event"] == "frames-done" and stage == "render":
                 rendered += event["frame_count"]
                 if rendered == 2 * CHUNK_FRAMES + 9:
                     process.send_signal(signal.SIGINT)

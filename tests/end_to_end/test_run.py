@@ -214,7 +214,7 @@ def test_comparison_and_contact_sheet(studio, draft) -> None:
     photo = frames_of(source)[0, ::2, ::2]
     np.testing.assert_allclose(frames[0, :, :64].astype(int), photo, atol=2)
     assert_dressed(frames[:, :, 128:], studio.walk(5), 0.5)
-    assert frames_of(sheet).shape == (1, 2 * 96, 4 * 192, 3)
+    assert frames_of(sheet).shape == (1, 2 * (96 + 28) + 8, 4 * (192 + 8) + 8, 3)
 
 
 def test_a_garment_in_place(studio, draft) -> None:
@@ -268,10 +268,10 @@ def test_json_events_tell_the_whole_story(studio, draft) -> None:
     events = [json.loads(line) for line in result.out.splitlines()]
     assert result.err == ""
     names = [event["event"] for event in events]
-    assert [name for name in names if name != "framesdone"] == [
+    assert [name for name in names if name != "frames-done"] == [
         *("stage", "started", "stage", "finished")
     ]
-    assert sum(event["frame_count"] for event in events if event["event"] == "framesdone") == 10
+    assert sum(event["frame_count"] for event in events if event["event"] == "frames-done") == 10
     assert events[-1]["output"] == str(output)
     assert (events[-1]["frame_count"], events[-1]["duration_seconds"]) == (5, pytest.approx(1 / 6))
 

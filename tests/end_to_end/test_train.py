@@ -237,7 +237,7 @@ def test_the_network_that_paints_iuv(studio, mt, body_model, blazepose) -> None:
     ("arguments", "message"),
     [
         (("--steps", 3, "iuv", "make", "data", "--people", 1), "mean nothing to `mt train iuv`"),
-        (("iuv", "make", "data"), "Missing option '--people'"),
+        (("iuv", "make", "data"), "missing option '--people'"),
         (("iuv", "fit", "nowhere", "run"), "make some by `mt train iuv make`"),
         (("iuv", "score", "nowhere", "w"), "nowhere holds no samples"),
     ],

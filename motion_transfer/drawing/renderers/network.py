@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import drawn_side
 from motion_transfer.errors import WeightsError
 from motion_transfer.weights.checkpoint import digest_weights, inspect_checkpoint
+
+log = logging.getLogger(__name__)
 
 MASK_REACH_SHARE = 0.04  # of the crop's side: how far hair and clothes may leave the IUV
 OPENING = threading.Lock()  # of networks, by a run's several threads
@@ -93,6 +96,7 @@ def open_recipe(weights: Path, wish: Wish) -> NetworkRecipe:
     Raises: InputError if it cannot be read, or not be run as wished.
     """
     how = choose_execution(wish, inspect_checkpoint(weights))
+    log.debug("weights %s run by %s", weights, how)
     return NetworkRecipe(weights, digest_weights(weights), how)
 
 

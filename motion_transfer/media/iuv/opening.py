@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,7 +13,13 @@ from jaxtyping import UInt8
 
 from motion_transfer.errors import InputError, IuvFileError
 from motion_transfer.media.files import check_readable
-from motion_transfer.media.folders import Numbering, list_files, list_gaps, number_frames
+from motion_transfer.media.folders import (
+    Numbering,
+    describe_rest,
+    list_files,
+    list_gaps,
+    number_frames,
+)
 from motion_transfer.media.iuv.formats import (
     CHANNEL_ORDERS,
     IUV_FORMATS,
@@ -113,7 +120,11 @@ def _open_folder(path: Path, missing: Missing) -> IuvStream:
     named = [file for file in frames[chosen.name] if file.stem.lower().endswith("iuv")]
     files = named or frames[chosen.name]
     numbering = number_frames([file.name for file in files], f"driver {path}")
-    return _open_numbered(path, chosen.folder_opener, files, numbering, missing)
+    stream = _open_numbered(path, chosen.folder_opener, files, numbering, missing)
+    stems = {re.sub("_iuv$", "", file.stem, flags=re.IGNORECASE) for file in named}
+    photos = [file for file in inside if file.stem in stems]  # that the IUV was made of
+    stream.notes += describe_rest(path, files, {*persons, *photos})
+    return stream
 
 
 def _open_listed(path: Path, row: IuvFormat, missing: Missing) -> IuvStream:

@@ -12,7 +12,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from motion_transfer.errors import InputError
-from motion_transfer.media.folders import list_files
+from motion_transfer.media.folders import describe_rest, list_files
 
 if TYPE_CHECKING:
     from motion_transfer.media.pictures.stream import PictureStream
@@ -65,7 +65,10 @@ def open_pictures(path: Path) -> PictureStream:
     if not path.exists():
         raise InputError(f"{path} does not exist")
     if path.is_dir():
-        return resolve_name(PHOTOS)(path, list_photos(path))
+        photos = list_photos(path)
+        stream = resolve_name(PHOTOS)(path, photos)
+        stream.notes += describe_rest(path, photos)
+        return stream
     rows = (row for row in PHOTO_FORMATS if path.suffix.lower() in row.suffixes)
     return resolve_name(next(rows, VIDEO).opener)(path)
 

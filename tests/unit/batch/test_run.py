@@ -92,4 +92,4 @@ def test_a_manifest_with_a_name_as_long_as_can_be_is_run(mt, manifest: Path, len
     assert (manifest.parent / "a.png").exists()
     (report,) = manifest.parent.glob("人*.report/index.html")
     assert len(report.parent.name.encode()) <= 255
-    assert mt("batch", "clean", long).out == "removed 1 work folders\n"
+    assert mt("batch", "clean", long).out == "removed 1 work folder\n"

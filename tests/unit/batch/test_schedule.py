@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -363,7 +364,7 @@ def test_the_report_knows_jobs_by_their_outputs(studio, run, walk) -> None:
     first = facts_of(run(anna, ben, gone))
     assert first["counts"] == {"done": 2, "failed": 1}
     later = facts_of(run(gone, ben, anna))
-    pictures = [{j["name"]: j["result_picture"] for j in f["jobs"]} for f in (first, later)]
+    pictures = [{j["name"]: j["source_picture"] for j in f["jobs"]} for f in (first, later)]
     assert pictures[0] == pictures[1]
     assert pictures[0].pop("gone.png") is None
     folder = studio.folder / "out/shoot.report"
@@ -371,6 +372,21 @@ def test_the_report_knows_jobs_by_their_outputs(studio, run, walk) -> None:
     assert all(
         f'src="{name}"' in (folder / "index.html").read_text() for name in pictures[0].values()
     )
+
+
+def test_seconds_of_a_job_leave_out_its_waiting(run, walk) -> None:
+    """The jobs begin together and wait for each other: what they worked adds up to what passed."""
+
+    def take_time(name: str, _number: int) -> None:
+        time.sleep(0.1 if name == "render" else 0)
+
+    began = time.monotonic()
+    jobs = [job(f"{name}.png", frames="0") for name in "abc"]
+    facts = facts_of(run(*jobs, before=take_time))
+    passed = time.monotonic() - began
+    seconds = [entry["seconds"] for entry in facts["jobs"]]
+    assert min(seconds) >= 0.1
+    assert sum(seconds) <= passed
 
 
 def facts_of(result: Run) -> dict[str, Any]:
@@ -388,7 +404,7 @@ def test_status_and_clean(studio, run, walk, mt) -> None:
     told = mt("batch", "status", manifest).out.splitlines()
     assert told[0] == "1 done, 2 failed, 1 to do"
     assert told[1].startswith("failed: bad.mp4: ")
-    assert json.loads(mt("batch", "status", manifest, "--json").out)["to do"] == 1
+    assert json.loads(mt("batch", "status", manifest, "--json").out)["to_do"] == 1
 
     with result.batch.state.held():
         refused = mt("batch", "clean", manifest)

@@ -61,7 +61,7 @@ def test_inspecting_a_driver(studio, mt, kind: str) -> None:
     assert told["size"] == "64 x 96"
     assert told["frames"] == count
     assert told["missing numbers"] == "none"
-    assert told["people a frame"] == {"1 people": f"{count} frames"}
+    assert told["people a frame"] == {"1 person": "1 frame" if count == 1 else "3 frames"}
     assert ("frame rate" in told) == ("video" in kind)
     assert "torso-back" in told["parts never seen"]
     shares = told["parts (share of the body's pixels)"]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import logging
+import re
 import subprocess
 import sys
 import warnings
@@ -118,3 +120,50 @@ def test_a_full_standard_output_is_one_line(arguments: list[str]) -> None:
 def test_what_a_terminal_would_obey_is_written_out() -> None:
     assert printable("größe 人.png") == "größe 人.png"
     assert printable("a\tb\r\x07‮c") == "a\\tb\\r\\x07\\u202ec"
+
+
+def test_verbose_shows_our_log_and_no_library_s(monkeypatch, capsys) -> None:
+    @click.command()
+    def info() -> None:
+        logging.getLogger("motion_transfer.render.run").debug("two\nlines")
+        logging.getLogger("PIL").debug("for developers")
+
+    monkeypatch.setattr("motion_transfer.cli.info.info", info)
+    log = logging.getLogger("motion_transfer")
+    monkeypatch.setattr(log, "handlers", [])
+    monkeypatch.setattr(log, "level", logging.WARNING)
+    monkeypatch.setattr(log, "propagate", True)
+    assert program.main(["info"]) == 0
+    assert capsys.readouterr().err == ""
+    for _ in range(2):  # the second time, it is not said twice
+        assert program.main(["info", "-v"]) == 0
+        (line,) = capsys.readouterr().err.splitlines()
+        assert re.fullmatch(r"mt: [0-9-]+T[0-9:.]+ DEBUG test_main: two\\nlines", line)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["rum"], "no command 'rum'; did you mean run? See `mt --help`"),
+        (["batch", "stat"], "no command 'stat'; did you mean status? See `mt batch --help`"),
+        (["qqq"], "no command 'qqq'; see `mt --help`"),
+        (["run", "--drivr", "a"], "no option --drivr; did you mean --driver? See `mt run --help`"),
+        (["info", "hats"], "invalid value for '[all|parts]': 'hats' is not one of"),
+        (["run", "a"], "missing option '--source'; see `mt run --help`"),
+    ],
+)
+def test_wrong_usage_is_one_line_in_the_one_style(capsys, arguments: list[str], line: str) -> None:
+    assert program.main(arguments) == program.UNUSABLE
+    said = capsys.readouterr().err
+    assert said.startswith(f"mt: {line}")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [(KeyboardInterrupt(), 130), (program.Terminated(), 143), (click.Abort(), 130)],
+)
+def test_exit_codes_of_signals(failing, capsys, error: BaseException, code: int) -> None:
+    failing(error)
+    assert program.main(["info"]) == code
+    assert str(code) in program.EPILOGUE  # where `mt --help` tells them

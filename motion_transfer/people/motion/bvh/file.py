@@ -290,4 +290,4 @@ def _read_frames(reader: _Reader, width: int, count: int, promised: int) -> Iter
     while reader.at < len(reader.lines):
         reader.at += 1
         if reader.lines[reader.at - 1].strip():
-            raise reader.error(f"more lines than the {count} frames that line {promised} promises")
+            raise reader.error(f"more lines than frames, of which line {promised} promises {count}")

@@ -429,3 +429,22 @@ def test_the_table_is_light() -> None:
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout == "[]\n"
+
+
+def test_what_else_lies_in_a_folder_is_told(studio) -> None:
+    """But for the photos that the IUV was made of, and the index that Caffe2 writes beside it."""
+    folder = studio.driver(3)
+    for name in ("frame_0.jpg", "frame_1_INDS.png"):
+        (folder / name).write_bytes(b"")
+    assert open_stream(folder).notes == ()
+    for name in ("clip.mp4", "notes.txt"):
+        (folder / name).write_bytes(b"")
+    (folder / "old").mkdir()
+    assert open_stream(folder).notes == (
+        f"of {folder}, frame_0_IUV.png to frame_2_IUV.png is read, and not clip.mp4, notes.txt,"
+        " old/",
+    )
+    for index in range(9):
+        (folder / f"a{index}.txt").write_bytes(b"")
+    (note,) = open_stream(folder).notes
+    assert note.endswith("a0.txt, a1.txt, a2.txt, a3.txt, a4.txt and 7 more")

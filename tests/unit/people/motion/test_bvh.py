@@ -184,7 +184,7 @@ def test_windows_line_ends_byte_order_mark_and_braces_on_the_same_line(tmp_path:
         (("Frames: 2", "Frames: two"), 17, "instead of Frames:"),
         (("Frames: 2", "Frames: 0"), 17, "no frames"),
         (("Frames: 2", "Frames: 3"), 20, "ends after 2 of 3 frames"),
-        (("Frames: 2", "Frames: 1"), 20, "more lines than the 1 frames that line 17"),
+        (("Frames: 2", "Frames: 1"), 20, "more lines than frames, of which line 17 promises 1"),
         (("0.0333333", "0"), 18, "frame time is 0 s"),
         (("0.0333333", "-0.1"), 18, "frame time is -0.1 s"),
         (("0.0333333", "soon"), 18, "'soon' is not a number"),
