@@ -21,7 +21,7 @@ from motion_transfer.events import Event, FramesDone, Stage
 from motion_transfer.media.output.formats import OUTPUT_KINDS
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import SCENES, list_options, parse_background
+from motion_transfer.option import SCENES, list_options, parse_background, read_whole
 from motion_transfer.preview.choices import Choice, built_in_motions, example_people
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.preview.dropped import DroppedFiles, clean_name
@@ -36,6 +36,7 @@ from motion_transfer.render.backdrop import no_pictures, open_background
 from motion_transfer.render.composition import cast_files, read_format
 from motion_transfer.render.inputs import find_source_iuv, is_clip, iuv_names
 from motion_transfer.render.options import (
+    NO_AUDIO,
     Garment,
     RenderOptions,
     SceneOptions,
@@ -258,10 +259,12 @@ class Session:
     def _parse(self, words: Mapping[str, Any]) -> dict[str, Any]:
         entries = {entry.name: entry for entry in list_options(RenderOptions)}
         given = {name: value for name, value in words.items() if name not in NAMING}
-        if given.get("crf") == "":
-            given["crf"] = None
-        if given.get("audio") == "":
-            given["audio"] = None
+        if "crf" in given:
+            given["crf"] = _read_crf(given["crf"])
+        if "audio" in given:
+            given["audio"] = given["audio"] or None
+            if given["audio"] not in (None, NO_AUDIO, str(self.options.audio)):
+                raise InputError(f"sound {given['audio']!r}; here it is the motion's own, or none")
         parsed = {name: entries[name].read(value) for name, value in given.items()}
         if self.driver is not None and parsed.get("frames") == (0, self.driver.frame_count):
             parsed["frames"] = (None, None)
@@ -543,6 +546,13 @@ class Session:
 
 class _ClosingError(Exception):
     """The preview ends while a source is being read."""
+
+
+def _read_crf(text: str) -> int | None:
+    try:
+        return read_whole(text) if text else None
+    except ValueError:
+        raise InputError(f"crf {text!r}; write a whole number, or nothing") from None
 
 
 def _check_output(options: RenderOptions) -> None:

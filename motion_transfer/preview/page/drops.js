@@ -2,6 +2,8 @@
 
 import { byId } from "./dom.js";
 
+const STILL_HERE_MS = 700; // browsers tell of what is dragged every 350 ms, give or take 200
+
 /** `takers`: for each place that files can be dropped on, what takes them. */
 export function setUpDrops(looking, takers) {
   const drops = byId("drops");
@@ -25,7 +27,7 @@ export function setUpDrops(looking, takers) {
     event.dataTransfer.dropEffect = place ? "copy" : "none";
     over(place ?? drops);
     clearTimeout(leaving); // "dragleave" comes for every element on the way, this does not
-    leaving = setTimeout(over, 300, null);
+    leaving = setTimeout(over, STILL_HERE_MS, null);
   });
   // Where none of them is hit, the browser would leave the page for the file.
   document.addEventListener("drop", (event) => {

@@ -345,7 +345,7 @@ def test_nobody_is_drawn_until_somebody_is_chosen(options: RenderOptions, open_s
     )
     assert picture(session.ask_frame(3, "result", session.key).result()).shape == (96, 64, 3)
     output = describe(session)["output"]
-    assert (output["name"], output["folder"]) == ("person_iuv", str(session.folder / "videos"))
+    assert (output["name"], output["folder"]) == ("person_driver", str(session.folder / "videos"))
 
 
 def test_another_motion_takes_the_place_of_the_first(
@@ -373,7 +373,7 @@ def test_another_motion_takes_the_place_of_the_first(
 def test_frames_that_are_sent_together_are_one_motion(options, open_session) -> None:
     session = open_session(options)
     numbers = []
-    for frame in sorted(options.driver.iterdir())[:7]:
+    for frame in (options.driver / f"frame_{index}_IUV.png" for index in range(7)):
         with session.dropped.begin("drop", frame.name) as upload:
             upload.write(frame.read_bytes())
             numbers.append(session.know_motion(upload.finish(motion=True)))
@@ -422,6 +422,8 @@ def test_clothes_come_from_another_photo(options, open_session, studio) -> None:
         ({"format": ".exe"}, "format '.exe'"),
         ({"format": ""}, "format ''"),
         ({"crf": "99"}, "takes a crf"),
+        ({"crf": "best"}, "whole number"),
+        ({"audio": "/etc/passwd"}, "sound '/etc/passwd'"),
         ({"format": ".gif", "crf": "20"}, "crf"),
     ],
 )
@@ -446,7 +448,7 @@ def test_names_that_nobody_gave_replace_nothing(options, open_session) -> None:
     session.change({"format": ".gif", "frames": "0:4"})
     numbers = [session.render(replace_output=False) for _ in range(2)]
     names = [rendered(session, number).options.output.name for number in numbers]
-    assert names == ["person_iuv.gif", "person_iuv-2.gif"]
+    assert names == ["person_driver.gif", "person_driver-2.gif"]
     assert all((session.folder / "videos" / name).is_file() for name in names)
 
 
