@@ -81,7 +81,7 @@ class Preview:
         """Send a request to a path of the server; returns status, headers and body."""
         assert self.address.hostname is not None
         connection = http.client.HTTPConnection(
-            self.address.hostname, self.address.port, timeout=20
+            self.address.hostname, self.address.port, timeout=60
         )
         if body is not None:
             headers = {"Content-Type": "application/json", **headers}
