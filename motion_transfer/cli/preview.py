@@ -36,6 +36,13 @@ preview_option = section("Preview")
     show_default=True,
     help='Where "Save job" writes.',
 )
+@preview_option(
+    "--folder",
+    type=FILE,
+    default=Path("~/motion-transfer"),
+    show_default=True,
+    help="For what the page is given, and what it makes.",
+)
 @preview_option("--port", type=int, default=0, help="Default: any that is free.")
 @preview_option("--no-open", is_flag=True, help="Print the link, and open no browser.")
 @described_options(RenderOptions, required=False)
@@ -46,6 +53,7 @@ def preview(
     job: int,
     frame: int | None,
     job_file: Path,
+    folder: Path,
     port: int,
     no_open: bool,
     garments: tuple[str, ...],
@@ -54,12 +62,14 @@ def preview(
     partner_person: tuple[str, ...],
     **words: Any,
 ) -> None:
-    """See a run frame by frame in the browser, before it is rendered.
+    """See a run frame by frame in the browser, and render it there.
 
+    Without options it begins empty: photo and motion are dropped on the page, or chosen there.
     The page listens on this machine only. Elsewhere, bring it here by a tunnel:
     ssh -L 8000:127.0.0.1:8000 HOST, and --port 8000 --no-open there. Ctrl-C ends it.
 
     \b
+    mt preview
     mt preview --source photo.png --driver iuv_frames/
     mt preview jobs/shoot.yaml --job 3
     mt preview --source photo.png --driver iuv_frames/ --frame 12 -o frame.png
@@ -68,8 +78,11 @@ def preview(
     words["garments"] = pair_words(garments, garment_parts, "garment", "parts")
     if manifest is not None:
         _refuse_others(context, manifest)
-        options = _options_of_job(manifest, job)
+        options, is_empty, names_output = _options_of_job(manifest, job), False, True
     else:
+        is_empty, names_output = not words["source"], bool(words["output"])
+        if frame is not None:
+            _refuse_without(words)
         options = _options_of_words(words)
     if options.adapt:
         from motion_transfer.render.composition import settle_weights
@@ -83,7 +96,8 @@ def preview(
         write_frame(options, frame, Path(words["output"]))
         tell(f"{words['output']}: frame {frame}, {options.renderer} renderer")
         return
-    _serve(options, job_file, port, open_browser=not no_open)
+    begin = {"is_empty": is_empty, "names_output": names_output}
+    _serve(options, folder.expanduser(), job_file, begin, port, open_browser=not no_open)
 
 
 def _refuse_others(context: click.Context, manifest: Path) -> None:
@@ -104,26 +118,42 @@ def _options_of_job(manifest: Path, number: int) -> RenderOptions:
     return jobs[number].options
 
 
-def _options_of_words(words: dict[str, Any]) -> RenderOptions:
+def _refuse_without(words: dict[str, Any]) -> None:
+    """Raise InputError unless a frame can be written at once."""
     for name in ("source", "driver"):
         if not words[name]:
             raise InputError(f"--{name} is missing; give a source and a driver, or a manifest")
-    output = words["output"]
-    if not output:
-        from motion_transfer.batch.expand import name_driver
-
-        output = f"{Path(words['source'][0]).stem}_{name_driver(words['driver'])}.mp4"
-    return options_from_words(RenderOptions, {**words, "output": output})
 
 
-def _serve(options: RenderOptions, job_file: Path, port: int, *, open_browser: bool) -> None:
+def _options_of_words(words: dict[str, Any]) -> RenderOptions:
+    """Read options; what is chosen on the page later has something in its place until then."""
+    from motion_transfer.preview.choices import FIRST_MOTION, FIRST_PERSON
+
+    given = {
+        **words,
+        "source": words["source"] or (FIRST_PERSON,),
+        "driver": words["driver"] or FIRST_MOTION,
+        "output": words["output"] or "video.mp4",
+    }
+    return options_from_words(RenderOptions, given)
+
+
+def _serve(
+    options: RenderOptions,
+    folder: Path,
+    job_file: Path,
+    begin: dict[str, bool],
+    port: int,
+    *,
+    open_browser: bool,
+) -> None:
     require_extra("preview")
     from motion_transfer.preview.server import PreviewServer
 
     def open_session() -> Any:
         from motion_transfer.preview.session import Session  # loads what draws: seconds
 
-        return Session(options, job_file)
+        return Session(options, folder, job_file, **begin)
 
     server = PreviewServer(port)
     click.echo(server.link)

@@ -15,6 +15,8 @@ ALPHA_GROWTH = 0.02  # likewise, where alpha shows them: single hairs and their 
 FAINT_ALPHA = 32  # of 255; less is noise of whoever made the alpha
 GROWN_PX = 512  # the longer side at which that is done
 FILL_PX = 512  # the fill is smooth: at that longer side nothing is lost, and much time saved
+SATURATION = 16  # parts of a coarse pixel, one of which has to be seen; the source's 4 by 4
+SMOOTHINGS = 8  # at each size: as the outline goes, so does the fill; more are not seen
 
 Frame = UInt8[np.ndarray, "H W 3"]
 
@@ -118,11 +120,17 @@ def _pull_push(picture: Frame, known: np.ndarray) -> Frame:
     levels = []
     while max(level.shape[:2]) > 1:
         levels.append((level, weight))
-        level, weight = cv2.pyrDown(level), cv2.pyrDown(weight)
+        level, seen = cv2.pyrDown(level), cv2.pyrDown(weight)
+        # what is seen in a small part of a coarse pixel is all that is known of it, and counts as
+        # if it were the whole: else far colours bleed in along the outline, as a seam
+        weight = np.minimum(1, seen * SATURATION)
+        level = level * (weight / np.maximum(seen, 1e-6))[..., None]
     filled = level.reshape(1, 1, 3) / np.maximum(weight.reshape(1, 1, 1), 1e-6)
     for level, weight in reversed(levels):
-        coarse = cv2.pyrUp(filled, dstsize=level.shape[1::-1])
-        filled = level + coarse * (1 - weight[..., None])
+        filled = cv2.pyrUp(filled, dstsize=level.shape[1::-1])
+        open_share = 1 - weight[..., None]
+        for _ in range(SMOOTHINGS):
+            filled = level + cv2.blur(filled, (3, 3)) * open_share
     return filled.round().clip(0, 255).astype(np.uint8)
 
 

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         turned,
         whole_body,
     )
+    from motion_transfer.people.motion.motions import MOTIONS
     from motion_transfer.people.motion.pose_sampler import sample_pose
     from motion_transfer.people.motion.poses import Arm, Leg, Pose, arm_chain, leg_chain
     from motion_transfer.people.person import DressedPerson, Person, sample_person
@@ -64,12 +65,12 @@ if TYPE_CHECKING:
     from motion_transfer.people.picture.iuv_noise import IuvNoise
 
 __all__ = [
-    "ARM_AT_ZERO", "FIRST_USE", "HELPERS_FIRST_USE", "LEG_AT_ZERO", "NECK", "SCHEME", "SPINE",
-    "AlbumOptions", "Arm", "Body", "BodyModel", "Bones", "Camera", "DressedPerson", "FreePerson",
-    "IuvNoise", "Leg", "MotionDriver", "MotionOptions", "PeopleDataset", "PeopleStream", "Person",
-    "PersonPhoto", "Pose", "PosedBody", "Rest", "Shape", "Shot", "Split", "Triangles",
-    "are_helpers_cached", "arm_bones", "arm_chain", "check_motion", "check_share", "depths",
-    "find_assets", "finger_bones", "is_cached", "is_motion", "leg_bones", "leg_chain",
+    "ARM_AT_ZERO", "FIRST_USE", "HELPERS_FIRST_USE", "LEG_AT_ZERO", "MOTIONS", "NECK", "SCHEME",
+    "SPINE", "AlbumOptions", "Arm", "Body", "BodyModel", "Bones", "Camera", "DressedPerson",
+    "FreePerson", "IuvNoise", "Leg", "MotionDriver", "MotionOptions", "PeopleDataset",
+    "PeopleStream", "Person", "PersonPhoto", "Pose", "PosedBody", "Rest", "Shape", "Shot", "Split",
+    "Triangles", "are_helpers_cached", "arm_bones", "arm_chain", "check_motion", "check_share",
+    "depths", "find_assets", "finger_bones", "is_cached", "is_motion", "leg_bones", "leg_chain",
     "load_assets", "load_body_model", "load_charts", "load_helpers", "mirrored_matrix",
     "open_motion", "rasterise", "record_motion", "render_iuv", "rotation", "sample_person",
     "sample_pose", "sample_shot", "turned", "whole_body", "write_album", "write_bvh",
@@ -90,6 +91,7 @@ _NAMES_OF = {
     "motion.bvh.writing": "write_bvh",
     "motion.limbs": "ARM_AT_ZERO LEG_AT_ZERO NECK SPINE Bones Rest arm_bones finger_bones leg_bones"
     " mirrored_matrix rotation turned whole_body",
+    "motion.motions": "MOTIONS",
     "motion.pose_sampler": "sample_pose",
     "motion.poses": "Arm Leg Pose arm_chain leg_chain",
     "person": "DressedPerson Person sample_person",

@@ -1,29 +1,32 @@
-"""Photos and videos that the page sends: written to files that commands and saved jobs can name.
+"""Photos, videos and motions that the page sends: they stay in a folder of the user's.
 
-A browser does not tell where a file lies that is dropped on a page, so that it gets a place here:
-`NAME.sources/` beside the job file, and in it a folder for each drop, in which a photo finds its
-IUV by name.
+A browser does not tell where a file lies that is dropped on a page, so that it gets a place here,
+in a folder for each drop, in which a photo finds its IUV by name. Commands, saved jobs and renders
+that wait name these files.
 """
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from motion_transfer.errors import InputError, OutputError
+from motion_transfer.media.iuv.formats import find_iuv_format
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES, open_pictures
 from motion_transfer.media.pictures.photo import explain_damage, open_image
-from motion_transfer.media.publish import explain_disk_errors, extend_name
+from motion_transfer.media.publish import explain_disk_errors
 
-MOST_FILE_BYTES = 512 * 2**20  # a minute of a phone's 4K video has about 400 MiB
-MOST_BYTES = 2 * 2**30  # of one preview: that many of them, and no full disk by mistake
+MOST_FILE_BYTES = 2 * 2**30  # five minutes of a phone's 4K video
+MOST_BYTES = 16 * 2**30  # of all that is in the folder: no full disk by mistake
 LONGEST_NAME = 60  # characters; four bytes each still leave room for endings
 NO_NAME = re.compile(r"[^\w.()-]+")
 """What is replaced in names: blanks, which shells part, marks of globs, and what is no text."""
+
+CAPTURED = b"HIERARCHY"
+"""How a BVH file begins, a motion that was captured."""
 
 ENDINGS = {
     "PNG": ".png",
@@ -39,13 +42,12 @@ ENDINGS = {
 
 
 class DroppedFiles:
-    """The folder of one preview's dropped files; it is made with the first of them."""
+    """The folder of dropped files; it is made with the first of them."""
 
-    def __init__(self, job_file: Path) -> None:
-        self.folder = job_file.with_name(extend_name(job_file.stem, ".sources"))
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self._drops: dict[str, Path] = {}
-        self._written: list[Path] = []
-        self.bytes = 0
+        self.bytes = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
     def begin(self, drop: str, name: str) -> Upload:
         """Begin to write a file.
@@ -68,30 +70,15 @@ class DroppedFiles:
             folder = self.folder / str(number)
             try:
                 folder.mkdir(parents=True)
-            except FileExistsError:
+            except (FileExistsError, NotADirectoryError):
                 if not self.folder.is_dir():
                     raise OutputError(
-                        f"{self.folder} is a file, where dropped photos are to be kept; choose"
-                        " another --job-file"
+                        f"{self.folder} is a file, where dropped files are to be kept; choose"
+                        " another --folder"
                     ) from None
                 number += 1
             else:
                 return folder
-
-    def add(self, path: Path) -> None:
-        """Take a finished file as one of ours."""
-        self._written.append(path)
-
-    def clean(self, named: Collection[Path]) -> None:
-        """Remove what was written, but for what is named, and folders that are empty then."""
-        for path in self._written:
-            if path not in named:
-                path.unlink(missing_ok=True)
-        for folder in (*self._drops.values(), self.folder):
-            try:
-                folder.rmdir()
-            except OSError:  # something is in it, or it was never made
-                continue
 
 
 class Upload:
@@ -113,22 +100,28 @@ class Upload:
         self._files.bytes += len(data)
         if self._size > MOST_FILE_BYTES or self._files.bytes > MOST_BYTES:
             raise InputError(
-                f"{self._name} is too large to be sent; start again with its path as --source"
+                f"{self._name} is too large: a file may have {MOST_FILE_BYTES // 2**30} GiB, and"
+                f" all of {self._files.folder} {MOST_BYTES // 2**30} GiB"
             )
         with explain_disk_errors(self._part):
             self._stream.write(data)
 
-    def finish(self) -> Path:
-        """Give the file its name. Raises: InputError if it is neither a photo nor a video."""
+    def finish(self, *, motion: bool = False) -> Path:
+        """Give the file its name.
+
+        Args:
+            motion: Whether it may be a motion as well: arrays of IUV, or BVH.
+        Raises: InputError if it is none of these.
+        """
         with explain_disk_errors(self._part):
             self._stream.close()
-            path = self._folder / name_for(self._part, self._name)
+            is_motion = motion and _is_motion(self._part, self._name)
+            path = self._folder / (self._name if is_motion else name_for(self._part, self._name))
             number = 1
             while path.exists():  # of a drop of several folders
                 number += 1
                 path = path.with_name(f"{Path(self._name).stem}-{number}{path.suffix}")
             self._part.rename(path)
-        self._files.add(path)
         return path
 
     def __exit__(
@@ -169,6 +162,13 @@ def name_for(file: Path, name: str) -> str:
     if holds not in ENDINGS:  # GIF, which FFmpeg reads, whatever it is called
         return name if suffix == f".{holds.lower()}" else f"{name}.{holds.lower()}"
     return name if suffix in PHOTO_SUFFIXES else name + ENDINGS[holds]
+
+
+def _is_motion(file: Path, name: str) -> bool:
+    if Path(name).suffix.lower() == ".bvh":
+        with file.open("rb") as stream:
+            return stream.read(len(CAPTURED)) == CAPTURED
+    return find_iuv_format(Path(name)).always_iuv  # whoever opens it looks at what it holds
 
 
 def _is_video(file: Path) -> bool:

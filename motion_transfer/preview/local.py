@@ -92,7 +92,7 @@ class Guard:
             return 416, "only one range of bytes is sent at once"
         if scope["method"] == "POST":
             # no form of another page can send these types without asking first
-            is_file = scope["path"].split("/")[2:3] in (["sources"], ["backgrounds"])
+            is_file = scope["path"].split("/")[2:3] == ["files"]
             wanted = "application/octet-stream" if is_file else "application/json"
             most = MOST_FILE_BYTES if is_file else MOST_BODY_BYTES
             if headers.get("content-type", "").split(";")[0].strip() != wanted:
@@ -100,8 +100,9 @@ class Guard:
             length = headers.get("content-length", "")
             if not re.fullmatch("[0-9]+", length):
                 return 411, "the length of the body has to be told"
-            if len(length) > 9 or int(length) > most:
-                return 413, f"the body is larger than {most} bytes"
+            if len(length) > 12 or int(length) > most:
+                limit = f"{most // 2**30} GiB" if is_file else f"{most} bytes"
+                return 413, f"too large; at most {limit} can be sent at once"
         return None
 
 

@@ -86,14 +86,16 @@ def make_app(session: Future[Session], token: str, closing: Callable[[], bool]) 
         Route("/still/{view}", handlers.still),
         Route("/source/{number}", handlers.source_picture),
         Route("/options", handlers.options, methods=["POST"]),
+        Route("/files/{purpose}/{drop}/{name}", handlers.receive, methods=["POST"]),
         Route("/source", handlers.choose_sources, methods=["POST"]),
-        Route("/sources/{drop}/{name}", handlers.receive, methods=["POST"]),
+        Route("/garments", handlers.choose_garments, methods=["POST"]),
+        Route("/motion", handlers.choose_motion, methods=["POST"]),
+        Route("/motion/cancel", handlers.cancel_motion, methods=["POST"]),
         Route("/background/{number}", handlers.background_picture),
-        Route("/backgrounds/{drop}/{name}", handlers.receive_background, methods=["POST"]),
-        Route("/render", handlers.render, methods=["POST"]),
-        Route("/render/stop", handlers.stop, methods=["POST"]),
+        Route("/renders", handlers.render, methods=["POST"]),
+        Route("/renders/{number}/{what}", handlers.tell_render, methods=["POST"]),
+        Route("/renders/{number}/file", handlers.result),
         Route("/job", handlers.job, methods=["POST"]),
-        Route("/result", handlers.result),
         Route("/{name}", handlers.page),
     ]
     # ours are named: what stands under Exception alone is raised again after the answer, and logged
@@ -138,7 +140,7 @@ class _Handlers:
         sent, session = -1, await self._session()
         while not self._closing():
             if session.revision != sent:
-                state = await run_in_threadpool(session.state)
+                state = await run_in_threadpool(_describe, session)
                 sent = state["revision"]
                 yield f"data: {json.dumps(state)}\n\n"
             await asyncio.sleep(STATE_SECONDS)
@@ -161,52 +163,63 @@ class _Handlers:
 
     async def source_picture(self, request: Request) -> Response:
         """Send one of the source's pictures."""
-        try:
-            number = read_whole(request.path_params["number"])
-        except ValueError:
-            raise HTTPException(404, "there is no such picture") from None
+        number = _number(request, "picture")
         small = request.query_params.get("small") == "1"
         future = (await self._session()).ask_source_picture(number, small=small)
         return await self._picture(request, future)
 
     async def receive(self, request: Request) -> Response:
-        """Write a dropped file, and give the number by which it can be chosen as a source."""
-        session = await self._session()
-        path = await self._write_file(request)
-        return JSONResponse({"number": session.know_source(path)})
-
-    async def receive_background(self, request: Request) -> Response:
-        """Write a dropped file, and give the word by which it can be chosen as a background."""
-        session = await self._session()
-        path = await self._write_file(request)
-        return JSONResponse({"value": session.know_background(path)})
-
-    async def background_picture(self, request: Request) -> Response:
-        """Send a small picture of a background."""
-        try:
-            number = read_whole(request.path_params["number"])
-        except ValueError:
-            raise HTTPException(404, "there is no such background") from None
-        return await self._picture(request, (await self._session()).ask_background(number))
-
-    async def _write_file(self, request: Request) -> Path:
+        """Write a dropped file, and give that by which it can be chosen: a number, or a word."""
         session, words = await self._session(), request.path_params
+        know = {
+            "source": session.know_source,
+            "motion": session.know_motion,
+            "background": session.know_background,
+        }.get(words["purpose"])
+        if know is None:
+            raise HTTPException(404, "files are sent as source, motion or background")
+        is_motion = words["purpose"] == "motion"
         with await run_in_threadpool(session.dropped.begin, words["drop"], words["name"]) as upload:
             async for data in request.stream():
                 await run_in_threadpool(upload.write, data)
-            return await run_in_threadpool(upload.finish)
+            path = await run_in_threadpool(upload.finish, motion=is_motion)
+        return JSONResponse({"known": know(path)})
+
+    async def background_picture(self, request: Request) -> Response:
+        """Send a small picture of a background."""
+        number = _number(request, "background")
+        return await self._picture(request, (await self._session()).ask_background(number))
 
     async def choose_sources(self, request: Request) -> Response:
         """Take some of the known sources, the one that leads first; as before if one is unfit."""
-        numbers = (await read_body(request)).get("numbers")
-        if not isinstance(numbers, list) or any(type(number) is not int for number in numbers):
-            raise InputError("numbers of sources are expected")
+        numbers = _numbers(await read_body(request))
+        return await self._do("choose_sources", numbers)
+
+    async def choose_garments(self, request: Request) -> Response:
+        """Take parts from other photos; as before if one is unfit."""
+        chosen = (await read_body(request)).get("garments")
+        if not isinstance(chosen, list) or not all(map(_is_garment, chosen)):
+            raise InputError("garments are expected, each with its number and its parts")
+        return await self._do(
+            "choose_garments", [(each["number"], each["parts"]) for each in chosen]
+        )
+
+    async def choose_motion(self, request: Request) -> Response:
+        """Take a known motion, or several files of one drop as one."""
+        return await self._do("choose_motion", _numbers(await read_body(request)))
+
+    async def cancel_motion(self, _request: Request) -> Response:
+        """Give up a driver that is being read."""
+        return await self._do("cancel_motion")
+
+    async def _do(self, method: str, *words: Any) -> Response:
+        """Let the session do something, and send how it stands then."""
         session = await self._session()
         try:
-            await run_in_threadpool(session.choose_sources, numbers)
+            await run_in_threadpool(getattr(session, method), *words)
         except (CancelledError, asyncio.CancelledError):  # by the server's end, before the queue's
             raise HTTPException(503, "the preview is closing") from None
-        return JSONResponse(await run_in_threadpool(session.state))
+        return JSONResponse(await run_in_threadpool(_describe, session))
 
     async def _picture(self, request: Request, future: Future[bytes]) -> Response:
         waiting = asyncio.wrap_future(future)
@@ -240,20 +253,24 @@ class _Handlers:
         except InputError as error:
             option = next(iter(texts), "")
             return JSONResponse({"error": str(error), "option": option}, 422)
-        return JSONResponse(await run_in_threadpool(session.state))
+        return JSONResponse(await run_in_threadpool(_describe, session))
 
     async def render(self, request: Request) -> Response:
-        """Begin the real run; 409 if its output is in the way and may not be replaced."""
+        """Queue the real run; 409 if its output is in the way and may not be replaced."""
         may_replace, session = await _may_replace(request), await self._session()
         try:
-            await run_in_threadpool(session.render, replace_output=may_replace)
+            number = await run_in_threadpool(session.render, replace_output=may_replace)
         except OutputError as error:
             return _in_the_way(error, session.options.output)
-        return JSONResponse({}, 202)
+        return JSONResponse({"number": number}, 202)
 
-    async def stop(self, _request: Request) -> Response:
-        """Stop the run; begun again, it goes on where it was."""
-        (await self._session()).rendering.stop()
+    async def tell_render(self, request: Request) -> Response:
+        """Stop a run, let it go on where it was, or forget it."""
+        renders = (await self._session()).renders
+        tell = {"stop": renders.stop, "resume": renders.resume, "remove": renders.remove}
+        if (what := request.path_params["what"]) not in tell:
+            raise HTTPException(404, "a render can be told to stop, resume or remove")
+        await run_in_threadpool(tell[what], _number(request, "render"))
         return JSONResponse({}, 202)
 
     async def job(self, request: Request) -> Response:
@@ -265,15 +282,44 @@ class _Handlers:
             return _in_the_way(error, session.job_file)
         return JSONResponse({"path": str(session.job_file), "text": text})
 
-    async def result(self, _request: Request) -> Response:
-        """Send the finished video."""
-        rendering = (await self._session()).rendering
-        if rendering.progress.status != "done" or rendering.options is None:
-            raise HTTPException(404, "nothing is rendered yet")
-        output = rendering.options.output
+    async def result(self, request: Request) -> Response:
+        """Send a finished file, to be shown or, with `download`, to be kept."""
+        render = (await self._session()).renders.get(_number(request, "render"))
+        output = render.options.output
+        if render.status != "done":
+            raise HTTPException(404, "it is not rendered yet")
         if not output.is_file():
             raise InputError(f"{output} is a folder of frames, or gone")
-        return FileResponse(output)
+        name = output.name if request.query_params.get("download") == "1" else None
+        return FileResponse(output, filename=name)  # a name makes it an attachment
+
+
+def _describe(session: Session) -> dict[str, Any]:
+    from motion_transfer.preview.state import describe  # loads what draws: seconds
+
+    return describe(session)
+
+
+def _number(request: Request, what: str) -> int:
+    try:
+        return read_whole(request.path_params["number"])
+    except ValueError:
+        raise HTTPException(404, f"there is no such {what}") from None
+
+
+def _numbers(body: dict[str, Any]) -> list[int]:
+    numbers = body.get("numbers")
+    if not isinstance(numbers, list) or any(type(number) is not int for number in numbers):
+        raise InputError("numbers are expected, of what can be chosen")
+    return numbers
+
+
+def _is_garment(entry: Any) -> bool:
+    return (
+        isinstance(entry, dict)
+        and type(entry.get("number")) is int
+        and isinstance(entry.get("parts"), str)
+    )
 
 
 def _in_the_way(error: OutputError, path: Path) -> Response:

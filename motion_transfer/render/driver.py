@@ -155,7 +155,7 @@ def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driv
         not go with it.
     """
     inputs = Inputs(motion_files(options))
-    if _are_pictures(options):
+    if are_pictures(options):
         # what estimates takes long to load, and a driver that is IUV needs none of it
         from motion_transfer.render.picture_driver import ORDER, estimate_driver
 
@@ -236,7 +236,8 @@ def _look(file: DriverIuv, frames: range, as_one: bool) -> list[SeenFrame]:
     return look_through(reader, frames, take_as_one if as_one else find_people)
 
 
-def _are_pictures(options: InputOptions) -> bool:
+def are_pictures(options: InputOptions) -> bool:
+    """Tell whether a driver is raw pictures. Raises: InputError if that cannot be told."""
     if not names_file(options.driver):
         return False
     if not options.driver.exists():

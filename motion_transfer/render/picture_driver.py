@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 import logging
+import shutil
 import uuid
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -87,8 +88,7 @@ def estimate_driver(
         meanwhile: what is kept is made from what its key says.
     """
     key = driver_key(options)
-    iuv = folder / f"driver-{key[:16]}.mkv"
-    facts = iuv.with_suffix(".json")
+    iuv, facts = _names(folder, key)
     driver = _read(iuv, facts, key)
     if driver is None:
         driver = _make(options, iuv, key, listener, inputs)
@@ -98,6 +98,28 @@ def estimate_driver(
     for note in driver.notes:
         listener(Notice(note))
     return driver
+
+
+def take_over(options: InputOptions, kept: Path, folder: Path) -> PictureDriver | None:
+    """Copy what was found in a driver's pictures before, and is kept elsewhere.
+
+    Returns: The copy; None if nothing is kept of this content.
+    Raises: InputError if there is no such driver.
+    """
+    key = driver_key(options)
+    iuv, facts = _names(kept, key)
+    driver = _read(iuv, facts, key)
+    if driver is None:
+        return None
+    for file in (iuv, facts):  # half a copy is known by its digest, and made again
+        shutil.copyfile(file, folder / file.name)
+    return replace(driver, iuv=folder / iuv.name)
+
+
+def _names(folder: Path, key: str) -> tuple[Path, Path]:
+    """Name the video that is kept, and the file with what else is known."""
+    iuv = folder / f"driver-{key[:16]}.mkv"
+    return iuv, iuv.with_suffix(".json")
 
 
 def _make(

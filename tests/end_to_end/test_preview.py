@@ -23,6 +23,8 @@ import av
 import pytest
 from PIL import Image
 
+from motion_transfer.estimate.models import missing_models
+
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
 expect = playwright.expect
 expect.set_options(timeout=30_000)  # ms; the network draws a frame in 1 s on two idle cores
@@ -35,7 +37,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs a chromium")
 DEMO = Path(str(files("motion_transfer.demo")))
 FRAMES, SIDE_PX = 120, 320  # of the demo's driver
 START_SECONDS = 60
-VIEWS = ("Result", "Compare", "IUV", "Source", "Partial texture", "Feature map", "Feature image")
+VIEWS = ("Result", "Compare", "IUV", "Person", "Partial texture", "Feature map", "Feature image")
 UNTOUCHED = {
     "renderer": "texture",
     "background": "white",
@@ -46,16 +48,17 @@ UNTOUCHED = {
     "window": None,
 }
 CONTROLS = "[...document.querySelectorAll('button, input, select, [role=slider], summary')]"
-DROP = """([files, target, kinds]) => {
+DROP = """([files, over, target]) => {
   const data = new DataTransfer();
   for (const [name, text] of files) {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
     data.items.add(new File([bytes], name));
   }
-  for (const kind of kinds) {
-    const how = { dataTransfer: data, bubbles: true, cancelable: true };
-    document.querySelector(target).dispatchEvent(new DragEvent(kind, how));
-  }
+  const how = { dataTransfer: data, bubbles: true, cancelable: true };
+  document.querySelector(over).dispatchEvent(new DragEvent("dragover", how));
+  const shown = document.querySelector(target).checkVisibility();
+  document.querySelector(target).dispatchEvent(new DragEvent("drop", how));
+  return shown;
 }"""
 PIXEL = """(image, [x, y]) => {
   const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
@@ -78,7 +81,7 @@ class Preview:
         """Send a request to a path of the server; returns status, headers and body."""
         assert self.address.hostname is not None
         connection = http.client.HTTPConnection(
-            self.address.hostname, self.address.port, timeout=20
+            self.address.hostname, self.address.port, timeout=60
         )
         if body is not None:
             headers = {"Content-Type": "application/json", **headers}
@@ -97,6 +100,7 @@ class Preview:
 def previewing(folder: Path, *arguments: object) -> Iterator[Preview]:
     """Run `mt preview`; it has to end by itself when it is interrupted."""
     command = [sys.executable, "-m", "motion_transfer", "preview", "--no-open", "--port", "0"]
+    command += ["--folder", str(folder / "home")]
     process = subprocess.Popen(
         [*command, *map(str, arguments)], cwd=folder, stdout=subprocess.PIPE, text=True
     )
@@ -144,14 +148,14 @@ def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
     """A page that shows its first picture; what it complains about fails the test."""
     pages, complaints = [], []
 
-    def open_link(link: str, **how: Any) -> Any:
+    def open_link(link: str, *, first: str = "#over[data-view=result]", **how: Any) -> Any:
         page = browser.new_page(**how)
         pages.append(page)
         page.set_default_timeout(15_000)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda message: complain(message))
         page.goto(link)
-        page.wait_for_selector("#over[data-view=result]", timeout=30_000)
+        page.wait_for_selector(first, timeout=30_000)
         return page
 
     def complain(message: Any) -> None:
@@ -212,17 +216,20 @@ def press(page: Any, name: str) -> None:
 
 
 def drop(page: Any, target: str, *paths: Path) -> None:
-    """Drop files on a part of the page."""
+    """Drop files on one of the places that the page shows while they are dragged over it."""
     files = [(path.name, base64.b64encode(path.read_bytes()).decode()) for path in paths]
-    page.evaluate(DROP, [files, target, ["dragover"]])
-    expect(page.locator("#drop-add")).to_be_visible()
-    page.evaluate(DROP, [files, target, ["drop"]])
-    expect(page.locator("#drop-add")).not_to_be_visible()
+    assert page.evaluate(DROP, [files, "#stage", target]), "it says where they can be dropped"
+    expect(page.locator("#drops")).not_to_be_visible()
+
+
+def unfold(page: Any) -> None:
+    """Show the rest of the output's options."""
+    page.get_by_text("Quality, sound, command").click()
 
 
 def test_the_page_says_what_it_shows(page) -> None:
     shows(page, 0)
-    expect(page.locator("#subject")).to_have_text("source.png in the motion of driver.mkv")
+    expect(page.locator("#subject")).to_have_text("source.png in the motion of Dance")
     expect(page.get_by_label("The same as a command")).to_contain_text("--renderer texture")
 
 
@@ -316,6 +323,7 @@ def test_each_view_shows_its_own_picture(page, preview) -> None:
     assert preview.post("options", {"renderer": "nhrr"}) == 200
     page.get_by_label("Frame", exact=True).fill("40")
     shown = set()
+    press(page, "Inside")
     for name, view in zip(
         VIEWS, ("result", "result", "iuv", "source", "texture", "map", "features"), strict=True
     ):
@@ -337,8 +345,9 @@ def test_photos_are_dropped_looked_at_and_removed(page, preview, tmp_path) -> No
     drop(page, "#drop-add", photo, iuv)
     expect(tiles).to_have_count(2)
     command = page.get_by_label("The same as a command")
-    expect(command).to_contain_text("--source preview.sources/1/again.png")
-    assert (preview.folder / "preview.sources" / "1" / "again.png").is_file()
+    dropped = preview.folder / "home" / "inputs" / "1" / "again.png"
+    expect(command).to_contain_text(f"--source {dropped}")
+    assert dropped.is_file()
     page.get_by_role("button", name="Show again.png").click()
     expect(page.locator("#which")).to_have_text("2 of 2 · again.png")
     shows(page, 0, "source")
@@ -350,7 +359,7 @@ def test_photos_are_dropped_looked_at_and_removed(page, preview, tmp_path) -> No
     expect(page.locator("#which")).to_have_text("1 of 2 · again.png · leads")
     expect(fault).not_to_be_visible()
     page.get_by_role("button", name="Remove again.png").click()
-    expect(page.locator("#subject")).to_have_text("source.png in the motion of driver.mkv")
+    expect(page.locator("#subject")).to_have_text("source.png in the motion of Dance")
     expect(tiles).to_have_count(1)
 
 
@@ -383,7 +392,7 @@ def test_a_scene_is_set(page, preview, tmp_path) -> None:
     page.locator("#background-file").set_input_files(tmp_path / "wall.png")
     until(lambda: pixel(page, 5, 5) == pytest.approx([200, 40, 90], abs=8))
     command = page.get_by_label("The same as a command")
-    expect(command).to_contain_text("--background preview.sources/")
+    expect(command).to_contain_text(f"--background {preview.folder / 'home' / 'inputs'}")
     tile = page.get_by_role("button", name="Background: wall.png")
     expect(tile).to_have_attribute("aria-pressed", "true")
     until(lambda: tile.locator("img").evaluate("image => image.naturalWidth > 0"))
@@ -417,7 +426,7 @@ def test_a_value_that_cannot_be_is_refused_in_words(page) -> None:
 
 
 def test_a_window_is_drawn_typed_and_given_back(page) -> None:
-    expect(page.locator("#outline")).to_be_visible()
+    expect(page.locator("#outline")).not_to_be_visible()  # it holds all of the frame
     press(page, "Draw a window")
     box = page.locator("#frame").bounding_box()
     scale = box["width"] / SIDE_PX
@@ -437,7 +446,22 @@ def test_a_window_is_drawn_typed_and_given_back(page) -> None:
     expect(page.get_by_label("The same as a command")).to_contain_text(",160")
     press(page, "Automatic")
     expect(page.locator("#window-words")).to_contain_text("Automatic")
-    expect(outline).not_to_have_attribute("width", "160")
+    expect(page.locator("#outline")).not_to_be_visible()
+
+
+def test_a_window_that_cannot_be_is_given_back_and_not_rendered(page) -> None:
+    side, automatic = page.get_by_label("Side"), page.get_by_role("button", name="Automatic")
+    before = side.input_value()
+    expect(automatic).to_be_disabled()
+    side.fill("3")
+    side.press("Enter")
+    expect(page.locator("#fault-window")).to_contain_text("between 16 and")
+    press(page, "Render")
+    expect(page.locator("#render-words")).to_contain_text("refused")
+    expect(page.get_by_label("Left")).to_be_focused()
+    automatic.click()
+    expect(page.locator("#fault-window")).to_have_count(0)
+    expect(side).to_have_value(before)
 
 
 def test_the_video_is_rendered_and_plays(page, preview) -> None:
@@ -445,14 +469,15 @@ def test_the_video_is_rendered_and_plays(page, preview) -> None:
     assert preview.post("options", {"frames": [0, 30]}) == 200
     expect(page.locator("#length")).to_contain_text("30 frames")
     press(page, "Render")
+    press(page, "Watch out.webm")
     film = page.locator("#film")
-    expect(film).to_be_visible(timeout=30_000)
+    expect(film).to_be_visible()
     until(lambda: film.evaluate("film => film.readyState") >= 3)
     assert film.evaluate("film => film.duration") == pytest.approx(2, abs=0.1)
     until(lambda: film.evaluate("film => film.currentTime") > 0.2)
     press(page, "Close")
     expect(film).not_to_be_visible()
-    expect(page.locator("#render-words")).to_contain_text("Wrote")
+    expect(page.locator("#renders li")).to_contain_text("Done in")
     with av.open(str(preview.folder / "out.webm")) as container:
         assert sum(1 for _ in container.decode(video=0)) == 30
 
@@ -472,11 +497,12 @@ def test_a_run_is_stopped(page, preview) -> None:
     assert preview.post("options", {"renderer": "nhrr"}) == 200
     expect(page.get_by_label("Renderer")).to_have_value("nhrr")
     press(page, "Render")
-    expect(page.get_by_role("progressbar", name="Rendering")).to_be_visible()
-    press(page, "Stop")
-    expect(page.locator("#render-words")).to_contain_text("topped")
-    expect(page.get_by_role("button", name="Render", exact=True)).to_be_enabled()
+    expect(page.get_by_role("progressbar", name="Rendering out.webm")).to_be_visible()
+    press(page, "Stop out.webm")
+    expect(page.get_by_role("button", name="Resume out.webm")).to_be_visible()
     assert not (preview.folder / "out.webm").exists()
+    press(page, "Forget out.webm")
+    expect(page.locator("#renders li")).to_have_count(0)
 
 
 def test_a_saved_job_is_what_a_batch_runs(page, preview, mt) -> None:
@@ -484,6 +510,7 @@ def test_a_saved_job_is_what_a_batch_runs(page, preview, mt) -> None:
     (preview.folder / "preview.yaml").unlink(missing_ok=True)
     assert preview.post("options", {"frames": [5, 9], "background": "black"}) == 200
     expect(page.locator("#length")).to_contain_text("4 frames")
+    unfold(page)
     press(page, "Save job")
     expect(page.locator("#saved-words")).to_contain_text("preview.yaml")
     expect(page.get_by_label("The saved job")).to_contain_text("background: black")
@@ -498,11 +525,106 @@ def test_a_saved_job_is_what_a_batch_runs(page, preview, mt) -> None:
 
 def test_the_command_is_copied(page, preview) -> None:
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    unfold(page)
     press(page, "Copy command")
     expect(page.get_by_role("button", name="Copied")).to_be_visible()
     command = page.evaluate("navigator.clipboard.readText()")
     assert command.startswith("mt run --source ")
     assert command == page.get_by_label("The same as a command").text_content()
+
+
+def test_the_keys_are_told(page) -> None:
+    page.keyboard.press("?")
+    keys = page.get_by_role("dialog")
+    expect(keys).to_contain_text("full screen")
+    assert keys.evaluate("dialog => dialog.scrollHeight <= innerHeight")
+    page.keyboard.press("Escape")
+    expect(keys).to_have_count(0)
+
+
+def test_the_picture_is_zoomed(page) -> None:
+    frame = page.locator("#frame")
+    fits = frame.bounding_box()["width"]
+    press(page, "Zoom in")
+    assert frame.bounding_box()["width"] == pytest.approx(1.5 * fits, abs=1)
+    page.keyboard.press("0")
+    assert frame.bounding_box()["width"] == pytest.approx(fits, abs=1)
+
+
+def test_a_person_stands_in_the_same_place_in_every_view(page, preview) -> None:
+    """Where the output is the square around the person, so is what is shown of the driver."""
+    window = {"x": 80, "y": 60, "side": 160}
+    assert preview.post("options", {"size": "crop", "window": window}) == 200
+    expect(page.locator("#window-words")).to_contain_text("by hand")
+    press(page, "IUV")
+    shows(page, 0, "iuv")
+    frame, image = page.locator("#frame").bounding_box(), page.locator("#over").bounding_box()
+    scale = frame["width"] / window["side"]
+    assert image["width"] == pytest.approx(SIDE_PX * scale, rel=0.01)
+    assert frame["x"] - image["x"] == pytest.approx(window["x"] * scale, rel=0.02)
+    assert preview.post("options", {"size": "driver"}) == 200
+
+
+def test_from_a_dropped_photo_to_a_downloaded_video(tmp_path, open_page) -> None:
+    """Nothing is given on the command line, and no terminal is needed from there on."""
+    with previewing(tmp_path) as running:
+        page = open_page(running.link, first="#welcome:not([hidden])")
+        for name in ("Render", "Compare", "Inside", "Set in here"):
+            expect(page.get_by_role("button", name=name, exact=True)).to_be_disabled()
+        expect(page.locator("#welcome-words")).to_contain_text(str(tmp_path / "home"))
+        drop(page, "#drop-replace", DEMO / "source.png", DEMO / "source_IUV.png")
+        shows(page, 0)
+        expect(page.locator("#welcome")).not_to_be_visible()
+        drop(page, "#drop-motion", DEMO / "wave.mkv")
+        expect(page.locator("#subject")).to_have_text("source.png in the motion of wave.mkv")
+        expect(page.locator("#clock")).to_contain_text("of 30")
+        page.get_by_label("Renderer").select_option("texture")
+        drop(page, "#drop-garment", DEMO / "source.png", DEMO / "source_IUV.png")
+        parts = page.get_by_role("group", name="Parts from source.png")
+        feet = parts.get_by_role("button", name="feet")
+        feet.click()
+        expect(feet).to_have_attribute("aria-pressed", "true")
+        command = page.get_by_label("The same as a command")
+        expect(command).to_contain_text("--garment-parts")
+        name = page.get_by_label("Name of the file")
+        name.fill("my wave")
+        name.press("Enter")
+        page.get_by_label("Format").select_option(".webm")
+        expect(command).to_contain_text("my_wave.webm")
+        press(page, "Render")
+        link = page.get_by_role("link", name="Download my_wave.webm")
+        with page.expect_download() as downloading:
+            link.click()
+        downloading.value.save_as(tmp_path / "got.webm")
+        assert downloading.value.suggested_filename == "my_wave.webm"
+    with av.open(str(tmp_path / "got.webm")) as container:
+        assert sum(1 for _ in container.decode(video=0)) == 30
+    with previewing(tmp_path) as again:  # what was made is still at hand
+        page = open_page(again.link, first="#renders li")
+        expect(page.get_by_role("link", name="Download my_wave.webm")).to_be_visible()
+
+
+@pytest.mark.skipif(bool(missing_models()), reason="needs `mt models fetch`")
+def test_a_clip_is_estimated_with_time_left_and_can_be_given_up(tmp_path, open_page, mt) -> None:
+    """A raw photo and a raw clip; what is found for the page is not searched again to render."""
+    clip, demo = tmp_path / "clip.mp4", ("--driver", DEMO / "driver.mkv", "--renderer", "texture")
+    made = mt("run", "--source", DEMO / "source.png", *demo, "--frames", "0:24", "-o", clip)
+    assert made.code == 0, made.err
+    with previewing(tmp_path, "--renderer", "texture") as running:
+        page = open_page(running.link, first="#welcome:not([hidden])")
+        drop(page, "#drop-replace", DEMO / "astronaut.jpg")
+        shows(page, 0)
+        drop(page, "#drop-motion", clip)
+        expect(page.locator("#work-words")).to_contain_text("Finding the person")
+        press(page, "Cancel")
+        expect(page.locator("#subject")).to_have_text("astronaut.jpg in the motion of Dance")
+        shows(page, 0)
+        press(page, "clip.mp4")
+        expect(page.get_by_role("button", name="Clip", exact=True)).to_be_visible(timeout=120_000)
+        shows(page, 0)
+        press(page, "Render")
+        expect(page.locator("#renders li")).to_contain_text("Done in", timeout=120_000)
+        assert "searched" not in page.locator("#renders li").inner_text()
 
 
 def test_a_broken_frame_says_so_and_the_others_work(tmp_path, open_page, browser) -> None:

@@ -16,7 +16,10 @@ export function setUpCrop(looking, choose) {
     looking.look({ drawing, view, playing: false });
     if (drawing) say("Drag a square on the picture, or type left, top and side.");
   });
-  byId("automatic").addEventListener("click", () => choose({ window: null }));
+  byId("automatic").addEventListener("click", async () => {
+    await choose({ window: null });
+    showWords(looking); // also in place of numbers that were refused
+  });
   byId("outlined").addEventListener("change", () => looking.look({}));
   setUpNumbers(looking, choose);
 
@@ -43,8 +46,8 @@ function setUpNumbers(looking, choose) {
   const fields = ["x", "y", "side"].map((name) => byId(`window-${name}`));
   for (const field of fields) {
     field.addEventListener("change", () => {
-      const [x, y, side] = fields.map((each) => each.valueAsNumber);
-      if ([x, y, side].every(Number.isFinite)) choose({ window: { x, y, side } });
+      // as it was typed: what is no number is refused in words, as any other value
+      choose({ window: fields.map((each) => each.value).join(",") });
     });
   }
 }
@@ -116,16 +119,31 @@ function showOutline(looking, drawn) {
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.setAttribute("preserveAspectRatio", "none");
   svg.classList.toggle("by-hand", Boolean(drawn ?? state.options.window));
+  // What lies outside the picture is cut off, but for a window that is being drawn.
+  const box = drawn ? boxOf(drawn) : within(window, width, height);
+  const isAll = box.width === width && box.height === height;
+  svg.toggleAttribute("hidden", isAll && !looking.drawing);
   for (const rect of svg.children) {
-    const box = { x: window.x, y: window.y, width: window.side, height: window.side };
     for (const [name, value] of Object.entries(box)) rect.setAttribute(name, value);
   }
+}
+
+function boxOf({ x, y, side }) {
+  return { x, y, width: side, height: side };
+}
+
+/** The part of a window that lies in the frame. */
+function within({ x, y, side }, width, height) {
+  const [left, top] = [Math.max(0, x), Math.max(0, y)];
+  const [right, bottom] = [Math.min(width, x + side), Math.min(height, y + side)];
+  return { x: left, y: top, width: Math.max(0, right - left), height: Math.max(0, bottom - top) };
 }
 
 function showWords(looking) {
   const { state, shot } = looking;
   byId("draw").disabled = !state?.driver;
-  byId("automatic").disabled = !state?.options.window;
+  const isRefused = byId("window-x").getAttribute("aria-invalid");
+  byId("automatic").disabled = !state?.options.window && !isRefused;
   for (const name of ["x", "y", "side"]) {
     const field = byId(`window-${name}`);
     field.disabled = !shot;

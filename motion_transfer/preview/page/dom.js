@@ -57,6 +57,15 @@ export function rateOf(words) {
   return Number.isFinite(rate) && rate > 0 ? rate : null;
 }
 
+/** Numbers that can be felt: ", about 2 min left"; nothing where it is not known yet. */
+export function timeLeft({ seconds_left: seconds }) {
+  if (seconds == null) return "";
+  if (seconds < 8) return ", a few seconds left";
+  if (seconds < 90) return `, about ${Math.ceil(seconds / 10) * 10} s left`;
+  if (seconds < 5400) return `, about ${Math.round(seconds / 60)} min left`;
+  return `, about ${(seconds / 3600).toFixed(1)} h left`;
+}
+
 export function plural(count, word) {
   return `${count} ${word}${count === 1 ? "" : "s"}`;
 }

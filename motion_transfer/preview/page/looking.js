@@ -9,6 +9,7 @@ export class Looking extends EventTarget {
   photo = null; // the number of the source that its view shows; null: the one that leads
   playing = false;
   drawing = false; // a crop window is being drawn
+  zoom = 1; // of the picture, to how it fits
   movedAt = 0; // ms, when the frame was last changed
   reconnecting = false; // the next state is newer, whatever its number
 
@@ -17,7 +18,7 @@ export class Looking extends EventTarget {
     // Answers to what was posted and the stream of events may overtake each other.
     if (this.state && state.revision < this.state.revision && !this.reconnecting) return;
     this.reconnecting = false;
-    const first = !this.state?.driver && state.driver;
+    const first = state.driver && (!this.state?.driver || this.state.motion !== state.motion);
     this.state = state;
     if (first) this.frame = state.options.frames?.[0] ?? 0;
     this.frame = this.clamp(this.frame);
@@ -62,10 +63,20 @@ export class Looking extends EventTarget {
     return Math.max(index, 0);
   }
 
+  /** Whether a source is the one that the view `source` shows. */
+  isLookedAt(number) {
+    return this.state.sources[this.photoIndex]?.number === number;
+  }
+
+  /** Whether there is somebody, and a motion: what it takes to draw. */
+  get isReady() {
+    return Boolean(this.state?.sources.length && this.state.driver);
+  }
+
   /** Whether the result shows the driver's whole frame, not the square around the person. */
   get isWhole() {
     const { size, driver } = this.state;
-    if (!size) return true;
+    if (!size || !driver) return true;
     const near = (a, b) => Math.abs(a - b) <= 1; // a frame may be made even
     return near(size.width, driver.width) && near(size.height, driver.height);
   }

@@ -1,6 +1,6 @@
 // What the server has to say besides: what it is doing, what is wrong with frames, who is asked.
 
-import { byId, make, plural, setText, toRanges } from "./dom.js";
+import { byId, make, plural, setText, timeLeft, toRanges } from "./dom.js";
 
 const WORK = {
   estimate: "Finding the person in the pictures",
@@ -13,27 +13,35 @@ export function setUpNotes(looking) {
   looking.addEventListener("state", () => {
     const { state } = looking;
     showSubject(state);
-    showWork(state.work);
+    showWork(state);
     showNotes(looking);
   });
 }
 
-function showSubject({ source, driver }) {
-  const names = [source?.name ?? "…", driver?.name ?? "…"];
-  setText(byId("subject"), `${names[0]} in the motion of ${names[1]}`);
+function showSubject({ source, sources, driver, motions, motion }) {
+  const who = source?.name ?? (sources.length ? "…" : null);
+  const whose = motions[motion].name;
+  setText(byId("subject"), who ? `${who} in the motion of ${whose}` : "");
   const size = driver ? `${driver.width} × ${driver.height}, ${plural(driver.frame_count, "frame")}` : "";
   byId("subject").title = size;
-  document.title = `${names[0]} · ${names[1]} · mt preview`;
+  document.title = who ? `${who} · ${whose} · Motion transfer` : "Motion transfer";
 }
 
-function showWork(work) {
+/** "Finding the person in the pictures, 34 of 300, about 40 s left" */
+export function workWords(work) {
+  const { stage, done, total } = work;
+  const share = total ? `, ${done} of ${total}` : "";
+  return `${WORK[stage] ?? stage}${share}${timeLeft(work)}`;
+}
+
+function showWork({ work, driver }) {
   byId("work").hidden = !work;
   if (!work) return;
-  const { stage, done, total } = work;
-  const share = total ? ` ${done} of ${total}` : "";
-  setText(byId("work-words"), `${WORK[stage] ?? stage}${share}`);
+  setText(byId("work-words"), workWords(work));
+  // Until its frames are there, somebody may rather have the one before.
+  byId("work-cancel").hidden = Boolean(driver);
   const bar = byId("work-bar");
-  if (total) Object.assign(bar, { max: total, value: done });
+  if (work.total) Object.assign(bar, { max: work.total, value: work.done });
   else bar.removeAttribute("value");
 }
 

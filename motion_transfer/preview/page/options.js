@@ -21,6 +21,7 @@ export function setUpOptions(looking) {
     for (const option of Object.keys(changes)) showFault(option, ok ? null : data.error);
     if (ok) looking.receive(data);
     else say(data.error);
+    looking.look({}); // what was refused, or is again as it was
     return ok;
   };
   // One after the other: two that overtake each other would leave the older one standing.
@@ -64,6 +65,7 @@ export function setOut(looking, choose) {
 
 function showOptions(looking) {
   const { options, choices } = looking.state;
+  byId("made").disabled = !looking.isReady;
   for (const name of ["renderer", "person", "driver_person", "size"]) {
     fill(byId(name), choices[name] ?? [], options[name]);
   }
@@ -76,7 +78,8 @@ function showRange(looking) {
   setNumber(byId("in"), start);
   setNumber(byId("out"), stop - 1);
   setNumber(byId("frame_rate"), state.options.frame_rate ?? "");
-  for (const id of ["in", "out", "in-here", "out-here"]) byId(id).disabled = !count;
+  for (const id of ["in", "out"]) byId(id).disabled = !count;
+  for (const id of ["in-here", "out-here"]) byId(id).disabled = !looking.isReady;
   byId("whole").hidden = !count || (start === 0 && stop === count);
   const length = `${plural(stop - start, "frame")}, ${((stop - start) / rate).toFixed(2)} s`;
   setText(byId("length"), count ? length : "");
@@ -95,20 +98,21 @@ for (const id of ["in", "out", "frame_rate"]) {
   byId(id).addEventListener("change", (event) => delete event.target.dataset.typed);
 }
 
-function fill(select, values, value) {
+/** Give a select its values, with the present one among them; what it shows stays if it can. */
+export function fill(select, values, value, words = WORDS) {
   const all = values.includes(value) ? values : [...values, value];
   const now = [...select.options].map((option) => option.value);
   if (now.join("\n") !== all.join("\n")) {
     select.replaceChildren(...all.map((each) => make("option", {
       value: each,
-      textContent: WORDS[each] ?? describePerson(each),
+      textContent: words[each] ?? describePerson(each),
     })));
   }
-  select.value = value;
+  if (select.value !== value) select.value = value;
 }
 
 function describePerson(word) {
-  return word === "0" ? "0, the leftmost" : word;
+  return word === "0" ? "the leftmost" : word;
 }
 
 /** Words under the fields of an option, or none. */

@@ -1,101 +1,85 @@
-// What the work is for: the rendered file, the saved job, the command.
+// What the file is to be: its name, its format, how good it is; and beginning to render it.
 
-import { byId, plural, say, setText } from "./dom.js";
+import { byId, say, setText } from "./dom.js";
+import { fill } from "./options.js";
 import { post } from "./server.js";
 
-const PICTURES = [".gif", ".png"];
-const FILMS = [".mp4", ".mov", ".webm", ".mkv"];
+const NO_SOUND = "none";
+const QUALITIES = [["finest", -6], ["usual", 0], ["smaller file", 6], ["smallest file", 12]];
 
-export function setUpOutput(looking) {
-  let mine = false; // this page has asked for the rendering under way
-  byId("render").addEventListener("click", async () => {
-    mine = (await postOrAsk("render", looking.state.output)) !== null;
-  });
-  byId("stop").addEventListener("click", () => post("render/stop", {}));
-  byId("watch").addEventListener("click", () => watch(looking.state));
-  byId("cinema-close").addEventListener("click", () => byId("cinema").close());
-  byId("cinema").addEventListener("close", () => {
-    byId("film").pause();
-    byId("film").removeAttribute("src");
-    byId("film").load(); // lets go of the file
-  });
+export function setUpOutput(looking, choose) {
+  const chosen = { name: (v) => v.trim(), format: (v) => v, crf: (v) => v, audio: (v) => v };
+  for (const [option, read] of Object.entries(chosen)) {
+    byId(option).addEventListener("change", ({ target }) => choose({ [option]: read(target.value) }));
+  }
+  byId("name").addEventListener("input", ({ target }) => (target.dataset.typed = "yes"));
+  byId("name").addEventListener("change", ({ target }) => delete target.dataset.typed);
+  byId("render").addEventListener("click", () => render(looking));
   byId("save").addEventListener("click", () => save(looking.state.job_file));
   byId("saved-close").addEventListener("click", () => byId("saved").close());
   byId("copy").addEventListener("click", copy);
+  looking.addEventListener("state", () => showOutput(looking));
+}
 
-  let before = null;
-  looking.addEventListener("state", () => {
-    const { render } = looking.state;
-    showRender(looking.state);
-    setText(byId("command"), looking.state.command ?? "");
-    if (before === "running" && render.status !== "running") {
-      say(wordsOf(render));
-      if (render.status === "done" && mine) {
-        looking.look({ playing: false });
-        watch(looking.state);
-      }
-      mine = false;
-    }
-    before = render.status;
-  });
+async function render(looking) {
+  const refused = document.querySelector(".panel [aria-invalid=true]");
+  if (refused) {
+    refused.closest("details")?.setAttribute("open", "");
+    refused.focus();
+    return showFault("Mend the value that was refused first, or it is not what is rendered.");
+  }
+  showFault("");
+  const { path } = looking.state.output;
+  if (await postOrAsk("renders", path)) say("Rendering.");
+  return undefined;
 }
 
 /** What could not be begun or saved; it stays until something else is. */
 function showFault(words) {
-  byId("render-words").classList.add("fault");
-  setText(byId("render-words"), words);
+  const line = byId("render-words");
+  line.classList.toggle("fault", Boolean(words));
+  if (words) say(words);
+  if (words) setText(line, words);
+  else line.dataset.shown = ""; // what is usual comes with the next state
 }
 
-function showRender({ render, driver, error }) {
-  const running = render.status === "running";
-  byId("render").disabled = running || !driver || Boolean(error);
-  byId("stop").hidden = !running;
-  byId("watch").hidden = render.status !== "done";
-  const bar = byId("render-bar");
-  bar.hidden = !running;
-  if (render.total) Object.assign(bar, { max: render.total, value: render.done });
-  else bar.removeAttribute("value");
-  const words = byId("render-words");
-  if (render.status === "idle" && words.classList.contains("fault")) return;
-  words.classList.toggle("fault", render.status === "failed");
-  setText(words, wordsOf(render));
-}
-
-function wordsOf({ status, stage, done, total, message, output, seconds }) {
-  const looked = { scan: " looked at", estimate: " searched for the person" }[stage] ?? "";
-  const time = seconds == null ? "" : ` in ${seconds.toFixed(1)} s`;
-  return {
-    idle: `Writes ${output}.`,
-    running: total ? `${done} of ${plural(total, "frame")}${looked}` : "Beginning…",
-    done: `Wrote ${output}${time}. ${message ?? ""}`.trim(),
-    failed: message || "Rendering failed.",
-    stopped: message || "Stopped. Render again to go on where it was.",
-  }[status];
-}
-
-/** Show what was rendered, as far as a browser can. */
-function watch({ render, revision, key }) {
-  const name = render.output.toLowerCase();
-  const address = `result?key=${encodeURIComponent(key)}&revision=${revision}`;
-  const [film, still] = [byId("film"), byId("still")];
-  const cannot = () => {
-    film.hidden = still.hidden = true;
-    setText(byId("cinema-words"), `This browser cannot show it; it lies at ${render.output}.`);
-  };
-  setText(byId("cinema-words"), wordsOf(render));
-  film.hidden = !FILMS.some((suffix) => name.endsWith(suffix));
-  still.hidden = !PICTURES.some((suffix) => name.endsWith(suffix));
-  film.onerror = () => film.getAttribute("src") && cannot();
-  still.onerror = cannot;
-  if (!film.hidden) {
-    film.src = address;
-    film.play().catch(() => {}); // where it may not start by itself, there are controls
-  } else if (!still.hidden) {
-    still.src = address;
-  } else {
-    cannot();
+function showOutput(looking) {
+  const { output, options, command, error } = looking.state;
+  byId("finish").disabled = !looking.isReady;
+  byId("render").disabled = Boolean(error || output.fault);
+  const name = byId("name");
+  if (!name.dataset.typed && !name.getAttribute("aria-invalid") && name.value !== output.name) {
+    name.value = looking.isReady ? output.name : "";
   }
-  if (!byId("cinema").open) byId("cinema").showModal();
+  fill(byId("format"), output.formats, output.format);
+  showQuality(output, options);
+  showSound(output, options);
+  setText(byId("command"), command ?? "");
+  const line = byId("render-words");
+  const words = output.fault || (looking.isReady ? `To ${output.folder}` : "");
+  if (line.dataset.shown === words) return; // what went wrong since then stays
+  line.dataset.shown = words;
+  line.classList.toggle("fault", Boolean(output.fault));
+  setText(line, words);
+}
+
+function showQuality({ crf, highest_crf: highest }, options) {
+  byId("quality-field").hidden = crf == null;
+  if (crf == null) return;
+  const words = {};
+  for (const [word, more] of QUALITIES) {
+    words[more ? String(Math.min(crf + more, highest)) : ""] = word;
+  }
+  const order = QUALITIES.map(([word]) => Object.keys(words).find((key) => words[key] === word));
+  const value = options.crf == null ? "" : String(options.crf);
+  if (!(value in words)) words[value] = `crf ${value}`;
+  fill(byId("crf"), order, value, words);
+}
+
+function showSound({ has_sound: hasSound }, { audio }) {
+  byId("sound-field").hidden = !hasSound;
+  const words = { "": "the motion's own, if any", [NO_SOUND]: "none" };
+  fill(byId("audio"), ["", NO_SOUND], audio ?? "", words);
 }
 
 async function save(file) {
@@ -132,7 +116,6 @@ async function postOrAsk(path, file) {
   }
   if (answer.ok) return answer.data;
   showFault(answer.data.error);
-  say(answer.data.error);
   return null;
 }
 

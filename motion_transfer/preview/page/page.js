@@ -2,12 +2,16 @@
 
 import { say } from "./dom.js";
 import { setUpCrop } from "./crop.js";
+import { setUpDrops } from "./drops.js";
+import { setUpGarments } from "./garments.js";
 import { setUpKeys } from "./keys.js";
 import { Looking } from "./looking.js";
+import { setUpMotions } from "./motions.js";
 import { setUpNotes, showLost } from "./notes.js";
 import { setUpOptions } from "./options.js";
 import { setUpOutput } from "./output.js";
 import { setUpPlayer } from "./player.js";
+import { setUpRenders } from "./renders.js";
 import { follow } from "./server.js";
 import { setUpScene } from "./scene.js";
 import { setUpSources } from "./sources.js";
@@ -15,19 +19,31 @@ import { Stage } from "./stage.js";
 import { setUpTimeline } from "./timeline.js";
 import { setUpViews } from "./views.js";
 import { setUpWipe } from "./wipe.js";
+import { setUpZoom } from "./zoom.js";
+
+// Where everything stands below everything else, what few need is folded away at first.
+if (matchMedia("(max-width: 899px)").matches) {
+  for (const part of document.querySelectorAll("details.part")) part.open = false;
+}
 
 const looking = new Looking();
 const stage = new Stage(looking);
 const choose = setUpOptions(looking);
-setUpSources(looking);
-setUpScene(looking, choose);
+setUpDrops(looking, {
+  ...setUpSources(looking),
+  motion: setUpMotions(looking),
+  garment: setUpGarments(looking),
+  background: setUpScene(looking, choose),
+});
 setUpViews(looking);
 setUpTimeline(looking, stage);
 setUpPlayer(looking);
 setUpWipe(looking);
 setUpCrop(looking, choose);
+setUpZoom(looking);
 setUpNotes(looking);
-setUpOutput(looking);
+setUpOutput(looking, choose);
+setUpRenders(looking);
 setUpKeys(looking, choose);
 
 let said = null; // the last error that was read out

@@ -22,7 +22,7 @@ export function setUpPlayer(looking) {
   let wasPlaying = false;
   looking.addEventListener("look", () => {
     setText(button, looking.playing ? "Pause" : "Play");
-    button.disabled = looking.count < 2;
+    button.disabled = looking.count < 2 || !looking.state;
     if (looking.playing && !wasPlaying) {
       began = null;
       shown = looking.frame;

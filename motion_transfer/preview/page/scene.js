@@ -1,7 +1,8 @@
 // The scene: what is behind, shown small, and how the person stands in it.
 
-import { byId, make, say, setText } from "./dom.js";
-import { post, postFile } from "./server.js";
+import { byId, make, setText } from "./dom.js";
+import { choosingFiles, Taker } from "./sending.js";
+import { ask } from "./server.js";
 
 const WORDS = {
   white: "White",
@@ -19,9 +20,10 @@ const COLOUR_PAUSE_MS = 150; // a colour picker tells of every shade it passes
 const SWITCHES = ["on_the_spot", "shadow", "match_colours"];
 const FIELDS = ["background_fit", "background_end", "background_blur", "place"];
 
+/** Returns what takes a file as background. */
 export function setUpScene(looking, choose) {
   setUpColour(choose);
-  setUpFile(looking);
+  const take = setUpFile(looking);
   for (const name of SWITCHES) {
     byId(name).addEventListener("change", (event) => choose({ [name]: event.target.checked }));
   }
@@ -33,6 +35,7 @@ export function setUpScene(looking, choose) {
     });
   }
   looking.addEventListener("state", () => showScene(looking.state, choose));
+  return take;
 }
 
 function setUpColour(choose) {
@@ -50,28 +53,19 @@ function setUpColour(choose) {
 }
 
 function setUpFile(looking) {
-  const [file, button] = [byId("background-file"), byId("add-background")];
-  button.addEventListener("click", () => {
-    file.value = ""; // the same file may be chosen again
-    file.click();
+  const button = byId("add-background");
+  const taker = new Taker("background", "background-words", "background-fault", () => {
+    button.disabled = Boolean(taker.busy);
+    taker.words.hidden = !taker.busy;
+    setText(taker.words, taker.busy ?? "");
   });
-  file.addEventListener("change", async () => {
-    const [sent] = file.files;
-    button.disabled = true;
-    tell(`Sending ${sent.name}…`);
-    const name = encodeURIComponent(sent.name);
-    const received = await postFile(`backgrounds/${Date.now()}/${name}`, sent);
-    const chosen = received.ok ? await post("options", { background: received.data.value }) : received;
-    tell(chosen.ok ? "" : chosen.data.error);
-    if (chosen.ok) looking.receive(chosen.data);
-    else say(chosen.data.error);
-    button.disabled = false;
+  const take = (files) => taker.work("Sending…", async () => {
+    const [background] = await taker.send(files.slice(0, 1));
+    looking.receive(await ask("options", { background }));
   });
-}
-
-function tell(words) {
-  byId("background-words").hidden = !words;
-  setText(byId("background-words"), words);
+  const open = choosingFiles(byId("background-file"), take);
+  button.addEventListener("click", () => open());
+  return take;
 }
 
 function showScene({ backgrounds, options, sources }, choose) {
@@ -94,7 +88,7 @@ function showScene({ backgrounds, options, sources }, choose) {
   }
 }
 
-function showTiles(backgrounds, lead, choose) {
+function showTiles(backgrounds, lead = "nobody", choose) {
   const list = byId("backgrounds");
   const signature = JSON.stringify([backgrounds, lead]);
   if (list.dataset.signature === signature) return; // a focused button stays what it is

@@ -1,146 +1,117 @@
 // The photos and videos of the person: those there are, and others that are dropped or chosen.
 
-import { byId, make, say, setText } from "./dom.js";
-import { post, postFile } from "./server.js";
+import { byId, make, setText, timeLeft } from "./dom.js";
+import { choosingFiles, Taker } from "./sending.js";
+import { ask } from "./server.js";
 
+/** Returns what takes files: {add, replace}. */
 export function setUpSources(looking) {
-  let busy = null; // what is under way, in words
-
-  /** Run one piece of work, which may throw what to say; meanwhile there is no other. */
-  const work = async (words, task) => {
-    if (busy) return;
-    showFault("");
-    tell(words);
-    try {
-      await task();
-    } catch (error) {
-      showFault(error.message);
-      say(error.message);
-    }
-    tell(null);
-  };
-  const tell = (words) => {
-    busy = words;
-    show();
-  };
-  const choose = async (numbers) => looking.receive(await answer(post("source", { numbers })));
+  const taker = new Taker("source", "sources-words", "sources-fault", () => show());
+  const choose = async (numbers) => looking.receive(await ask("source", { numbers }));
   const present = () => looking.state.sources.map(({ number }) => number);
-  const take = (files, replace) => work("Sending…", async () => {
-    const sent = [];
-    const drop = Date.now(); // what comes together lies together: a photo and its IUV
-    for (const file of files) {
-      tell(`Sending ${file.name}…`);
-      const name = encodeURIComponent(file.name);
-      sent.push((await answer(postFile(`sources/${drop}/${name}`, file))).number);
-    }
-    tell("Looking for the person…");
+  const take = (files, replace) => taker.work("Sending…", async () => {
+    const sent = await taker.send(files);
+    taker.tell("Looking for the person…");
     await choose(replace ? sent : [...present(), ...sent]);
+    looking.look({ view: looking.view === "iuv" ? "result" : looking.view });
   });
-  const show = () => showSources(looking, busy, {
+  const add = (files) => take(files, false);
+  const replace = (files) => take(files, true);
+  const show = () => showSources(looking, taker, {
     look: (number) => looking.look({ view: "source", photo: number, playing: false }),
-    remove: (number) => work("Reading the others…", () => {
+    take: (number) => taker.work("Reading it…", () => choose([number])),
+    remove: (number) => taker.work("Reading the others…", () => {
       return choose(present().filter((each) => each !== number));
     }),
   });
 
-  byId("lead-photo").addEventListener("click", () => work("Reading again…", () => {
+  const open = choosingFiles(byId("files"), add);
+  byId("add-photos").addEventListener("click", () => open());
+  byId("welcome-choose").addEventListener("click", () => open());
+  byId("replace-photos").addEventListener("click", () => open(replace));
+  byId("welcome-example").addEventListener("click", () => {
+    const [{ number }] = looking.state.examples;
+    taker.work("Reading it…", () => choose([number]));
+  });
+  byId("lead-photo").addEventListener("click", () => taker.work("Reading again…", () => {
     return choose([looking.photo, ...present().filter((number) => number !== looking.photo)]);
   }));
-  setUpButtons(take);
-  setUpDropping(take);
   looking.addEventListener("look", show);
+  return { add, replace };
 }
 
-async function answer(posted) {
-  const { ok, data } = await posted;
-  if (!ok) throw new Error(data.error);
-  return data;
-}
-
-function setUpButtons(take) {
-  const files = byId("files");
-  let replace = false;
-  for (const [id, replaces] of [["add-photos", false], ["replace-photos", true]]) {
-    byId(id).addEventListener("click", () => {
-      replace = replaces;
-      files.value = ""; // the same file may be chosen again
-      files.click();
-    });
-  }
-  files.addEventListener("change", () => take([...files.files], replace));
-}
-
-/** Files may be dropped on the panel; elsewhere the browser would leave the page for them. */
-function setUpDropping(take) {
-  const panel = byId("sources");
-  const [add, replace] = [byId("drop-add"), byId("drop-replace")];
-  let leaving;
-  const over = (target) => {
-    panel.classList.toggle("dropping", target !== null);
-    add.classList.toggle("over", panel.contains(target) && target !== replace);
-    replace.classList.toggle("over", target === replace);
-  };
-  document.addEventListener("dragover", (event) => {
-    if (!event.dataTransfer.types.includes("Files")) return;
-    event.preventDefault();
-    event.dataTransfer.dropEffect = panel.contains(event.target) ? "copy" : "none";
-    over(event.target);
-    clearTimeout(leaving); // "dragleave" comes for every element on the way, this does not
-    leaving = setTimeout(over, 300, null);
-  });
-  document.addEventListener("drop", (event) => {
-    if (!event.dataTransfer.types.includes("Files")) return;
-    event.preventDefault();
-    over(null);
-    const files = [...event.dataTransfer.files];
-    if (panel.contains(event.target) && files.length) take(files, event.target === replace);
-  });
-}
-
-function showSources(looking, busy, actions) {
+function showSources(looking, { busy }, actions) {
   const { state, view, photo } = looking;
   if (!state) return;
-  showTiles(state.sources, actions);
+  const isEmpty = !state.sources.length;
+  showTiles(state, actions);
   for (const tile of byId("photos").children) {
-    const [show, remove] = tile.querySelectorAll("button");
-    const { number } = state.sources[looking.photoIndex];
-    const looksAt = view === "source" && Number(tile.dataset.number) === number;
-    show.setAttribute("aria-pressed", String(looksAt));
-    remove.disabled = Boolean(busy);
+    const [button, remove] = tile.querySelectorAll("button");
+    const looksAt = view === "source" && looking.isLookedAt(Number(tile.dataset.number));
+    button.setAttribute("aria-pressed", String(looksAt));
+    if (remove) remove.disabled = Boolean(busy);
+    else button.disabled = Boolean(busy);
   }
-  for (const id of ["add-photos", "replace-photos", "lead-photo"]) byId(id).disabled = Boolean(busy);
+  for (const id of ["add-photos", "replace-photos", "lead-photo", "welcome-choose", "welcome-example"]) {
+    byId(id).disabled = Boolean(busy);
+  }
+  setText(byId("add-photos"), isEmpty ? "Choose a photo…" : "Add…");
+  byId("replace-photos").hidden = isEmpty;
   byId("lead-photo").hidden = photo === null || looking.photoIndex === 0 || view !== "source";
-  const { done, total } = state.source_work ?? {};
-  const share = busy && total ? ` ${done} of ${total}` : "";
-  const invitation = "Or drop photos, or a video, of this person here; they are kept in";
-  setText(byId("sources-words"), busy ? `${busy}${share}` : `${invitation} ${state.dropped_in}/`);
+  showWords(state, busy);
 }
 
-function showTiles(sources, { look, remove }) {
+function showWords({ source_work: work, folder, limits, sources }, busy) {
+  const share = busy && work?.total ? ` ${work.done} of ${work.total}${timeLeft(work)}` : "";
+  const [most, all] = [limits.file, limits.all].map((bytes) => `${Math.round(bytes / 2 ** 30)} GiB`);
+  const kept = `What you give stays on this machine, in ${folder}/inputs: up to ${most} a file, ${all} in all.`;
+  const more = "More photos of this person show more sides. Drop them anywhere.";
+  setText(byId("sources-words"), busy ? `${busy}${share}` : sources.length ? more : "");
+  setText(byId("welcome-words"), busy ? `${busy}${share}` : kept);
+}
+
+/** What is drawn, or, as long as nobody is, who could be. */
+function showTiles({ sources, examples }, { look, take, remove }) {
   const list = byId("photos");
-  const signature = JSON.stringify(sources);
+  const signature = JSON.stringify([sources, examples]);
   if (list.dataset.signature === signature) return; // a focused button stays what it is
   list.dataset.signature = signature;
-  list.replaceChildren(...sources.map(({ number, name }, index) => {
-    const leads = index === 0 && sources.length > 1;
-    const image = make("img", { src: `source/${number}?small=1&at=${index}`, alt: "" });
-    const mark = leads ? [make("span", { className: "leads", textContent: "leads" })] : [];
-    const show = make("button", { type: "button", className: "photo", title: name }, image, ...mark);
-    show.setAttribute("aria-label", `Show ${name}${leads ? ", which leads" : ""}`);
-    show.addEventListener("click", () => look(number));
-    const away = make("button", { type: "button", className: "away", textContent: "×" });
-    away.setAttribute("aria-label", `Remove ${name}`);
-    away.hidden = sources.length < 2;
-    away.addEventListener("click", () => remove(number));
-    const words = make("span", { className: "photo-name", textContent: name });
-    const tile = make("li", {}, show, words, away);
-    tile.dataset.number = number;
-    return tile;
-  }));
+  const chosen = sources.map(({ number }) => number);
+  const others = examples.filter(({ number }) => !chosen.includes(number));
+  list.replaceChildren(
+    ...sources.map((source, index) => sourceTile(source, index, sources.length, look, remove)),
+    ...(sources.length ? [] : others.map((example) => exampleTile(example, take))),
+  );
 }
 
-/** Why the last choice was not taken; it stays until there is another. */
-function showFault(words) {
-  byId("sources-fault").hidden = !words;
-  setText(byId("sources-fault"), words);
+function sourceTile({ number, name }, index, count, look, remove) {
+  const leads = index === 0 && count > 1;
+  const mark = leads ? [make("span", { className: "leads", textContent: "leads" })] : [];
+  const show = photoButton(number, name, `&at=${index}`, mark);
+  show.setAttribute("aria-label", `Show ${name}${leads ? ", which leads" : ""}`);
+  show.addEventListener("click", () => look(number));
+  const away = make("button", { type: "button", className: "away", textContent: "×" });
+  away.setAttribute("aria-label", `Remove ${name}`);
+  away.hidden = count < 2;
+  away.addEventListener("click", () => remove(number));
+  return tileOf(number, name, show, away);
+}
+
+function exampleTile({ number, name }, take) {
+  const button = photoButton(number, name, "", []);
+  button.setAttribute("aria-label", `Take ${name}`);
+  button.addEventListener("click", () => take(number));
+  return tileOf(number, name, button);
+}
+
+function photoButton(number, name, query, marks) {
+  const image = make("img", { src: `source/${number}?small=1${query}`, alt: "" });
+  return make("button", { type: "button", className: "photo", title: name }, image, ...marks);
+}
+
+function tileOf(number, name, ...buttons) {
+  const words = make("span", { className: "photo-name", textContent: name });
+  const tile = make("li", {}, ...buttons, words);
+  tile.dataset.number = number;
+  return tile;
 }

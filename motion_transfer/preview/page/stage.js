@@ -2,7 +2,8 @@
 
 import { byId, oncePerFrame, say, setText } from "./dom.js";
 import { PictureStore } from "./pictures.js";
-import { isStill, layersOf, NAMES } from "./views.js";
+import { workWords } from "./notes.js";
+import { isStill, layersOf, NAMES, needsPerson, showsDriverFrame } from "./views.js";
 
 const SETTLED_MS = 120; // without a move; only then is the network put to work
 const AHEAD = 5; // pictures fetched ahead while playing
@@ -45,6 +46,7 @@ export class Stage {
     clearTimeout(this.settling);
     const { state, playing, view, frame } = this.looking;
     if (!state || (!state.driver && !isStill(view))) return this.store.want([]);
+    if (needsPerson(view) && !state.sources.length) return this.store.want([]);
     if (playing) return this.store.want(this.#askAhead(), { patient: true });
     const calm = this.looking.movedAt + SETTLED_MS - performance.now();
     if (calm > 0) this.settling = setTimeout(() => this.#ask(), calm);
@@ -98,6 +100,9 @@ export class Stage {
 
   #draw() {
     const { state, view, frame } = this.looking;
+    const isEmpty = Boolean(state) && needsPerson(view) && !state.sources.length;
+    byId("welcome").hidden = !isEmpty;
+    if (isEmpty) return this.#showTrouble("");
     const why = this.#whyNothing();
     if (why !== null) return this.#showTrouble(why);
     const layers = layersOf(view, state);
@@ -115,7 +120,8 @@ export class Stage {
     if (!state) return "";
     if (state.error) return state.error;
     if (isStill(view) ? state.source : state.driver) return null;
-    return isStill(view) ? "Opening the photo…" : "Opening the driver…";
+    if (isStill(view)) return "Opening the photo…";
+    return state.work ? `${workWords(state.work)}.` : "Opening the motion…";
   }
 
   /** While frames rush by, show the last that came: a slider that is dragged shows motion too. */
@@ -132,7 +138,11 @@ export class Stage {
 
   #show(layers, best, frame) {
     const images = layers.length === 2 ? [byId("base"), byId("over")] : [byId("over")];
+    // What the result does not show of the driver's frame is not shown of the driver either, so that
+    // a person stands in the same place in every view.
+    const isCut = layers.length === 1 && layers[0].onFrame && !showsDriverFrame(layers[0].name, this.looking);
     byId("base").hidden = layers.length < 2;
+    byId("over").classList.toggle("cut", Boolean(isCut));
     layers.forEach((layer, index) => {
       const image = images[index];
       image.hidden = false;
@@ -142,30 +152,31 @@ export class Stage {
     });
     byId("trouble").hidden = true;
     byId("frame").hidden = false;
-    this.#fit();
-    this.#placeBase(frame);
+    this.#fit(isCut);
+    this.#place(byId("base"), frame, !this.looking.isWhole);
+    this.#place(byId("over"), frame, isCut);
     this.#label(best.at(-1), layers.at(-1));
     this.#tell();
   }
 
   /** The box has the shape of its upper picture, known once that is decoded. */
-  #fit() {
+  #fit(isCut) {
     const over = byId("over");
     const apply = () => {
       if (!over.naturalWidth) return;
-      byId("frame").style.setProperty("--ratio", over.naturalWidth / over.naturalHeight);
+      const ratio = isCut ? 1 : over.naturalWidth / over.naturalHeight;
+      byId("frame").style.setProperty("--ratio", ratio);
       byId("frame").classList.toggle("small", over.naturalWidth < 96);
     };
     if (over.complete) apply();
     over.onload = apply;
   }
 
-  /** Where the result shows a square only, the driver's frame is moved to lie under it. */
-  #placeBase(frame) {
-    const { style } = byId("base");
-    const { state, isWhole } = this.looking;
+  /** Where the result shows a square only, the driver's frame is moved so that both agree. */
+  #place({ style }, frame, isCut) {
+    const { state } = this.looking;
     const shot = state.shots?.find(({ start, stop }) => start <= frame && frame < stop);
-    const cut = !isWhole && shot && state.driver;
+    const cut = isCut && shot && state.driver;
     const share = (length) => `${(100 * length) / shot.side}%`;
     style.left = cut ? share(-shot.x) : "0";
     style.top = cut ? share(-shot.y) : "0";
@@ -178,7 +189,7 @@ export class Stage {
     const which = byId("which");
     which.hidden = layer.name !== "source" || state.sources.length < 2;
     const leads = photoIndex === 0 ? " · leads" : "";
-    const { name } = state.sources[photoIndex];
+    const name = state.sources[photoIndex]?.name;
     setText(which, `${photoIndex + 1} of ${state.sources.length} · ${name}${leads}`);
     const badge = byId("quality");
     badge.hidden = layer.name !== "result";
@@ -196,7 +207,7 @@ export class Stage {
     byId("which").hidden = true;
     byId("stage").classList.remove("waiting");
     const trouble = byId("trouble");
-    trouble.hidden = false;
+    trouble.hidden = !words;
     trouble.dataset.frame = frame;
     const isPart = state?.driver && !state.error && !isStill(view) && words;
     const isNew = trouble.textContent !== words;

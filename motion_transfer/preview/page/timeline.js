@@ -29,7 +29,7 @@ export function step(looking, frames) {
 function showPlace(looking) {
   const { frame, count, rate } = looking;
   const [slider, jump] = [byId("slider"), byId("jump")];
-  slider.disabled = count === 0;
+  for (const control of [slider, jump, byId("back"), byId("on")]) control.disabled = count === 0;
   slider.max = Math.max(count - 1, 0);
   slider.value = frame;
   const seconds = clock(frame / rate);

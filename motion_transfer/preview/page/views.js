@@ -4,7 +4,7 @@ import { byId, make } from "./dom.js";
 
 const frame = (view) => (index) => `frame/${index}/${view}`;
 const still = (view) => () => `still/${view}`;
-const photo = (_index, looking) => `source/${looking.state.sources[looking.photoIndex].number}`;
+const photo = (_index, looking) => `source/${looking.state.sources[looking.photoIndex]?.number}`;
 
 // `drafts`: a quick stand-in is there while the picture is under way. `onFrame`: drawn on the
 // driver's frame, so that a crop window can be drawn on it. `quick`: comes within a moment.
@@ -22,12 +22,15 @@ const VIEWS = [
   ["result", "Result"],
   ["compare", "Compare"],
   ["iuv", "IUV"],
-  ["pictures", "Picture"],
-  ["source", "Source"],
+  ["pictures", "Clip"],
+  ["source", "Person"],
   ["texture", "Partial texture"],
   ["map", "Feature map"],
   ["features", "Feature image"],
 ];
+
+/** What the method makes on its way: of interest to few, and put away for the others. */
+const INSIDE = ["texture", "map", "features"];
 
 export const NAMES = Object.fromEntries(VIEWS);
 
@@ -48,7 +51,7 @@ export function driverView(state) {
 
 /** Whether the crop window can be shown on this view. */
 export function showsDriverFrame(view, looking) {
-  if (PICTURES[view]?.onFrame) return true;
+  if (PICTURES[view]?.onFrame) return looking.isWhole || looking.drawing;
   return (view === "result" || view === "compare") && looking.isWhole;
 }
 
@@ -56,20 +59,46 @@ export function isStill(view) {
   return Boolean(PICTURES[view]?.still);
 }
 
+/** Whether a view needs somebody to be drawn. */
+export function needsPerson(view) {
+  return view !== "iuv" && view !== "pictures";
+}
+
 /** The row of buttons. Buttons rather than radios: the arrow keys belong to the frames. */
 export function setUpViews(looking) {
   const buttons = new Map();
+  const inside = make("span", { id: "inside", className: "inside" });
+  const toggle = make("button", { id: "show-inside", type: "button", textContent: "Inside" });
   for (const [view, label] of VIEWS) {
     const button = make("button", { type: "button", textContent: label });
     button.addEventListener("click", () => looking.look({ view }));
     buttons.set(view, button);
-    byId("views").append(button);
+    if (!INSIDE.includes(view)) byId("views").append(button);
+    else inside.append(button);
   }
+  byId("views").append(toggle, inside);
+  toggle.setAttribute("aria-controls", "inside");
+  toggle.addEventListener("click", () => {
+    const open = inside.hidden;
+    inside.hidden = !open;
+    if (!open && INSIDE.includes(looking.view)) looking.look({ view: "result" });
+    toggle.setAttribute("aria-expanded", String(open));
+  });
+  inside.hidden = true;
+  toggle.setAttribute("aria-expanded", "false");
   looking.addEventListener("look", () => {
+    const { state } = looking;
     for (const [view, button] of buttons) {
       button.setAttribute("aria-pressed", String(view === looking.view));
+      const there = needsPerson(view) ? state?.sources.length : state?.driver;
+      button.disabled = !there && view !== looking.view;
     }
-    buttons.get("pictures").hidden = !looking.state?.driver?.pictures;
+    toggle.disabled = !state?.sources.length;
+    if (INSIDE.includes(looking.view)) {
+      inside.hidden = false;
+      toggle.setAttribute("aria-expanded", "true");
+    }
+    buttons.get("pictures").hidden = !state?.driver?.pictures;
   });
 }
 

@@ -69,6 +69,17 @@ def test_a_fill_goes_smoothly_from_one_side_to_the_other() -> None:
     assert (np.diff(filled[64, 40:90, 0].astype(int)) >= 0).all()
 
 
+def test_a_fill_shows_no_seam() -> None:
+    """Where a wall grows lighter from side to side, nobody is to see who stood before it."""
+    wall = np.repeat(np.linspace(0, 255, 300)[None], 400, 0).round().astype(np.uint8)
+    wall = np.repeat(wall[..., None], 3, 2)
+    hole = np.zeros((400, 300), np.uint8)
+    hole[20:380, 60:240] = 1
+    filled = fill_from_around(wall, hole)[..., 0].astype(int)
+    for outside, inside in ((59, 61), (240, 238)):
+        assert np.abs(filled[60:340, outside] - filled[60:340, inside]).max() <= 1
+
+
 def test_a_picture_that_is_all_hole_stays_defined() -> None:
     picture = np.full((9, 9, 3), 77, np.uint8)
     assert fill_from_around(picture, np.ones((9, 9), np.uint8)).shape == picture.shape

@@ -13,7 +13,7 @@ from motion_transfer.preview.dropped import DroppedFiles, clean_name
 
 @pytest.fixture
 def files(tmp_path: Path) -> DroppedFiles:
-    return DroppedFiles(tmp_path / "job.yaml")
+    return DroppedFiles(tmp_path / "inputs")
 
 
 def send(files: DroppedFiles, name: str, data: bytes, drop: str = "a") -> Path:
@@ -70,20 +70,30 @@ def test_too_much_is_refused(studio, files: DroppedFiles, monkeypatch) -> None:
         send(files, "you.png", photo)
 
 
-def test_drops_do_not_meet_and_only_what_nobody_names_goes(studio, files, tmp_path) -> None:
+def test_drops_do_not_meet_and_what_is_there_counts(studio, files, tmp_path) -> None:
     photo = studio.source().read_bytes()
     kept = send(files, "me.png", photo)
     again = send(files, "me.png", photo)
     others = send(files, "me.png", photo, "b")
-    assert [p.relative_to(tmp_path / "job.sources") for p in (kept, again, others)] == [
+    assert [p.relative_to(tmp_path / "inputs") for p in (kept, again, others)] == [
         Path("1/me.png"),
         Path("1/me-2.png"),
         Path("2/me.png"),
     ]
-    later = DroppedFiles(tmp_path / "job.yaml")
+    later = DroppedFiles(tmp_path / "inputs")
+    assert later.bytes == 3 * len(photo)
     assert send(later, "me.png", photo).parent.name == "3"
-    later.clean(set())
-    files.clean({kept})
-    assert [path for path in files.folder.rglob("*") if path.is_file()] == [kept]
-    files.clean(set())
-    assert not files.folder.exists()
+
+
+def test_motions_are_taken_where_a_motion_is_wanted(files: DroppedFiles) -> None:
+    bvh = b"HIERARCHY\nROOT Hips\n"
+    with pytest.raises(InputError, match="is no video"):
+        send(files, "walk.bvh", bvh)
+    for name, data in (("walk.bvh", bvh), ("walk.npy", b"\x93NUMPY")):
+        with files.begin("a", name) as upload:
+            upload.write(data)
+            assert upload.finish(motion=True).name == name
+    with files.begin("a", "run.bvh") as upload:
+        upload.write(b"no motion")
+        with pytest.raises(InputError, match="is no video"):
+            upload.finish(motion=True)

@@ -107,11 +107,11 @@ def test_what_is_sent_is_json_of_a_bounded_size(headers: dict, status: int) -> N
 @pytest.mark.parametrize(
     ("path", "kind", "length", "status"),
     [
-        (f"/{TOKEN}/sources/1/a.png", "application/octet-stream", MOST_FILE_BYTES, 200),
-        (f"/{TOKEN}/sources/1/a.png", "application/octet-stream", MOST_FILE_BYTES + 1, 413),
-        (f"/{TOKEN}/sources/1/a.png", "multipart/form-data", 9, 415),
+        (f"/{TOKEN}/files/source/1/a.png", "application/octet-stream", MOST_FILE_BYTES, 200),
+        (f"/{TOKEN}/files/source/1/a.png", "application/octet-stream", MOST_FILE_BYTES + 1, 413),
+        (f"/{TOKEN}/files/source/1/a.png", "multipart/form-data", 9, 415),
         (f"/{TOKEN}/options", "application/octet-stream", 9, 415),
-        ("/wrong/sources/1/a.png", "application/octet-stream", 9, 404),
+        ("/wrong/files/source/1/a.png", "application/octet-stream", 9, 404),
     ],
 )
 def test_files_are_sent_as_no_form_can(path: str, kind: str, length: int, status: int) -> None:

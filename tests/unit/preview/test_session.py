@@ -20,7 +20,9 @@ from motion_transfer.events import ignore
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.preview.driver import PreviewedDriver, plan_frames
 from motion_transfer.preview.queue import StaleError
+from motion_transfer.preview.renders import Render
 from motion_transfer.preview.session import Session
+from motion_transfer.preview.state import describe
 from motion_transfer.preview.views import Views, project_features
 from motion_transfer.render.driver import open_driver
 from motion_transfer.render.options import Partner, RenderOptions
@@ -44,8 +46,8 @@ def options(studio, tmp_path: Path) -> RenderOptions:
 def open_session(tmp_path: Path) -> Iterator[Callable[[RenderOptions], Session]]:
     sessions = []
 
-    def make(options: RenderOptions) -> Session:
-        sessions.append(Session(options, tmp_path / "job.yaml"))
+    def make(options: RenderOptions, **how: bool) -> Session:
+        sessions.append(Session(options, tmp_path / "home", tmp_path / "job.yaml", **how))
         return sessions[-1]
 
     yield make
@@ -160,7 +162,7 @@ def test_a_broken_frame_is_marked_and_the_others_are_shown(
     (options.driver / "frame_7_IUV.png").write_bytes(b"no picture")
     session = open_session(options)
     session.wait_for_plan()
-    state = session.state()
+    state = describe(session)
     assert list(state["broken"]) == [7]
     assert "frame_7_IUV.png" in state["broken"][7]
     with pytest.raises(InputError, match="frame_7_IUV"):
@@ -176,13 +178,13 @@ def test_a_file_that_changes_is_named_on_the_page(
     session = open_session(options)
     session.wait_for_plan()
     session.ask_frame(8, "result", session.key).result()
-    revision = session.state()["revision"]
+    revision = describe(session)["revision"]
     folder = options.driver if name.startswith("frame") else options.source[0].parent
     (folder / name).write_bytes((options.driver / "frame_1_IUV.png").read_bytes())
     time.sleep(0.2)  # it looks again and again, but not all the time
     with pytest.raises(InputError, match=f"{name} has changed since"):
         session.ask_frame(9, "result", session.key)
-    state = session.state()
+    state = describe(session)
     assert f"{name} has changed since" in state["error"]
     assert state["revision"] > revision
 
@@ -307,43 +309,147 @@ def test_there_are_only_so_many_pictures(
         session.ask_still("nothing")
 
 
+def rendered(session: Session, number: int) -> Render:
+    """Wait for a run's end."""
+    wait_for(lambda: session.renders.get(number).status not in ("waiting", "running"))
+    return session.renders.get(number)
+
+
 def test_rendering_makes_what_the_run_makes(options: RenderOptions, open_session) -> None:
     session = open_session(options)
     session.wait_for_plan()
     session.change({"background": "black", "frames": "3:9"})
-    session.render(replace_output=False)
-    wait_for(lambda: session.rendering.progress.status != "running")
-    progress = session.rendering.progress
-    assert (progress.status, progress.done, progress.total) == ("done", 6, 6)
+    render = rendered(session, session.render(replace_output=False))
+    assert render.progress is not None
+    assert (render.status, render.progress.done, render.progress.total) == ("done", 6, 6)
     first = read_photo(options.output / "000000.png").rgb
     assert (first[0, 0] == 0).all()
     with pytest.raises(OutputError, match="exists already"):
         session.render(replace_output=False)
-    session.render(replace_output=True)
-    wait_for(lambda: session.rendering.progress.status != "running")
-    assert session.rendering.progress.status == "done"
+    assert rendered(session, session.render(replace_output=True)).status == "done"
+    assert len(session.renders.all) == 1, "the one that it replaces is forgotten"
 
 
-def test_a_stopped_run_leaves_nothing_under_the_final_name(
-    options: RenderOptions, open_session
+def test_nobody_is_drawn_until_somebody_is_chosen(options: RenderOptions, open_session) -> None:
+    session = open_session(options, is_empty=True, names_output=False)
+    session.wait_for_plan()
+    state = describe(session)
+    assert (state["sources"], state["command"], state["error"]) == ([], "", None)
+    with pytest.raises(InputError, match="drop a photo"):
+        session.ask_frame(3, "result", session.key)
+    with pytest.raises(InputError, match="drop a photo"):
+        session.render(replace_output=False)
+    assert picture(session.ask_frame(3, "iuv", session.key).result()).shape == (96, 64, 3)
+    session.choose_sources(
+        drop(session, options.source[0], options.source[0].with_stem("person_IUV"))
+    )
+    assert picture(session.ask_frame(3, "result", session.key).result()).shape == (96, 64, 3)
+    output = describe(session)["output"]
+    assert (output["name"], output["folder"]) == ("person_driver", str(session.folder / "videos"))
+
+
+def test_another_motion_takes_the_place_of_the_first(
+    options: RenderOptions, open_session, studio
 ) -> None:
     session = open_session(options)
     session.wait_for_plan()
-    session.rendering._hear = stop_at_first(session.rendering)
-    session.render(replace_output=False)
-    wait_for(lambda: session.rendering.progress.status != "running")
-    assert session.rendering.progress.status == "stopped"
-    assert not options.output.exists()
+    session.change({"frames": "3:9", "window": "1,2,60"})
+    key = session.key
+    number = session.know_motion(studio.video(9))
+    session.choose_motion([number])
+    session.wait_for_plan()
+    state = describe(session)
+    assert state["driver"]["frame_count"] == 9
+    assert (state["options"]["frames"], state["options"]["window"]) == ([0, 9], None)
+    assert session.key != key
+    with pytest.raises(StaleError):
+        session.ask_frame(0, "result", key)
+    assert picture(session.ask_frame(8, "result", session.key).result()).ndim == 3
+    session.cancel_motion()
+    session.wait_for_plan()
+    assert describe(session)["driver"]["frame_count"] == COUNT
 
 
-def test_a_run_that_fails_says_why(options: RenderOptions, open_session) -> None:
+def test_frames_that_are_sent_together_are_one_motion(options, open_session) -> None:
+    session = open_session(options)
+    numbers = []
+    for frame in (options.driver / f"frame_{index}_IUV.png" for index in range(7)):
+        with session.dropped.begin("drop", frame.name) as upload:
+            upload.write(frame.read_bytes())
+            numbers.append(session.know_motion(upload.finish(motion=True)))
+    session.choose_motion(numbers)
+    session.wait_for_plan()
+    assert describe(session)["driver"]["frame_count"] == 7
+
+
+def test_a_motion_that_is_none_leaves_the_others_to_choose(options, open_session, studio) -> None:
     session = open_session(options)
     session.wait_for_plan()
-    options.source[0].unlink()
-    session.render(replace_output=False)
-    wait_for(lambda: session.rendering.progress.status != "running")
-    assert session.rendering.progress.status == "failed"
-    assert "does not exist" in session.rendering.progress.message
+    first = session.motion
+    session.choose_motion([session.know_motion(studio.folder / "gone.mkv")])
+    with pytest.raises(InputError, match=r"gone\.mkv does not exist"):
+        session.wait_for_plan()
+    session.choose_motion([first])
+    session.wait_for_plan()
+    assert session.error is None
+    with pytest.raises(InputError, match="no such motion"):
+        session.choose_motion([99])
+
+
+def test_clothes_come_from_another_photo(options, open_session, studio) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    red = studio.source("red", colours={LEGS: (250, 0, 0)})
+    before = session.ask_frame(3, "result", session.key).result()
+    (number, _) = drop(session, red, studio.folder / "red_IUV.png")
+    session.choose_garments([(number, "upper-legs,lower-legs")])
+    worn = session.ask_frame(3, "result", session.key).result()
+    assert worn != before
+    assert describe(session)["garments"] == [
+        {"number": number, "name": "red.png", "parts": ["upper-legs", "lower-legs"]}
+    ]
+    assert "--garment-parts" in describe(session)["command"]
+    with pytest.raises(InputError, match="unknown part"):
+        session.choose_garments([(number, "hat")])
+    assert session.ask_frame(3, "result", session.key).result() == worn
+    session.choose_garments([])
+    assert session.ask_frame(3, "result", session.key).result() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ({"format": ".exe"}, "format '.exe'"),
+        ({"format": ""}, "format ''"),
+        ({"crf": "99"}, "takes a crf"),
+        ({"crf": "best"}, "whole number"),
+        ({"audio": "/etc/passwd"}, "sound '/etc/passwd'"),
+        ({"format": ".gif", "crf": "20"}, "crf"),
+    ],
+)
+def test_outputs_that_cannot_be(options, open_session, words: dict, reason: str) -> None:
+    session = open_session(replace(options, output=options.output.with_suffix(".mp4")))
+    with pytest.raises(InputError, match=reason):
+        session.change(words)
+
+
+def test_an_output_gets_a_name_and_no_path(options, open_session) -> None:
+    session = open_session(replace(options, output=options.output.with_suffix(".mp4")))
+    session.change({"name": "../../etc/my dance", "crf": "30"})
+    assert session.options.output == options.output.with_name("my_dance.mp4")
+    session.change({"format": ".gif"})
+    assert session.options.output.name == "my_dance.gif"
+    assert session.options.crf is None, "which was the video's"
+
+
+def test_names_that_nobody_gave_replace_nothing(options, open_session) -> None:
+    session = open_session(options, names_output=False)
+    session.wait_for_plan()
+    session.change({"format": ".gif", "frames": "0:4"})
+    numbers = [session.render(replace_output=False) for _ in range(2)]
+    names = [rendered(session, number).options.output.name for number in numbers]
+    assert names == ["person_driver.gif", "person_driver-2.gif"]
+    assert all((session.folder / "videos" / name).is_file() for name in names)
 
 
 def test_a_saved_job_is_the_run(options: RenderOptions, open_session, tmp_path: Path) -> None:
@@ -362,7 +468,7 @@ def test_a_driver_that_is_none_is_said_in_words(options: RenderOptions, open_ses
     session = open_session(replace(options, driver=options.driver.with_name("gone")))
     with pytest.raises(InputError, match="gone does not exist"):
         session.wait_for_plan()
-    state = session.state()
+    state = describe(session)
     assert "does not exist" in state["error"]
     assert state["driver"] is None
 
@@ -372,7 +478,7 @@ def test_an_error_goes_when_its_cause_does(options: RenderOptions, open_session)
     with pytest.raises(InputError, match="person 5"):
         session.wait_for_plan()
     session.change({"driver_person": "largest"})
-    assert session.state()["error"] is None
+    assert describe(session)["error"] is None
     assert picture(session.ask_frame(3, "result", session.key).result()).shape == (96, 64, 3)
 
 
@@ -381,7 +487,7 @@ def test_somebody_only_between_the_sampled_frames_is_found(studio, options, open
     frames[3:8] = studio.iuv()
     session = open_session(replace(options, driver=studio.array(frames)))
     session.wait_for_plan()
-    state = session.state()
+    state = describe(session)
     assert state["error"] is None
     assert state["missing"] == ((0, 3), (8, 200))
 
@@ -389,7 +495,7 @@ def test_somebody_only_between_the_sampled_frames_is_found(studio, options, open
 def test_a_source_that_is_none_is_said_in_words(options: RenderOptions, open_session) -> None:
     session = open_session(replace(options, source=(options.source[0].with_name("gone.png"),)))
     wait_for(lambda: session.error is not None)
-    assert "gone.png does not exist" in session.state()["error"]
+    assert "gone.png does not exist" in describe(session)["error"]
 
 
 def drop(session: Session, *photos: Path) -> list[int]:
@@ -412,7 +518,7 @@ def test_dropped_photos_join_replace_and_lead(studio, options, open_session) -> 
     session.choose_sources([0, *numbers])
     assert session.key != key
     assert session.ask_still("texture").result() != alone
-    names = [source["name"] for source in session.state()["sources"]]
+    names = [source["name"] for source in describe(session)["sources"]]
     assert names == ["person.png", "legs.png"], "IUV is no source"
     session.choose_sources([numbers[0], 0])
     assert [path.name for path in session.options.source] == ["legs.png", "person.png"]
@@ -437,18 +543,13 @@ def test_a_photo_of_nobody_leaves_the_source_as_it_was(studio, options, open_ses
     assert picture(session.ask_frame(3, "result", key).result()).shape == (96, 64, 3)
 
 
-def test_what_a_saved_job_names_outlives_the_preview(studio, options, tmp_path) -> None:
-    session = Session(options, tmp_path / "job.yaml")
+def test_what_was_sent_outlives_the_preview(studio, options, tmp_path) -> None:
+    session = Session(options, tmp_path / "home", tmp_path / "job.yaml")
     session.wait_for_plan()
-    named = drop(session, studio.source("named"), studio.folder / "named_IUV.png")
-    unused = drop(session, studio.source("unused"), studio.folder / "unused_IUV.png")
-    session.choose_sources([0, *named])
+    numbers = drop(session, studio.source("named"), studio.folder / "named_IUV.png")
+    session.choose_sources([0, *numbers])
     session.save_job(replace_file=False)
-    session.choose_sources([0, *unused])
-    session.choose_sources([0])
     session.close()
-    kept = {path.name for path in session.dropped.folder.rglob("*.png")}
-    assert kept == {"named.png", "named_IUV.png"}
     (job,) = expand(*read_manifest(tmp_path / "job.yaml"))
     assert [path.name for path in job.options.source] == ["person.png", "named.png"]
     assert all(path.exists() for path in job.options.source)
@@ -461,16 +562,6 @@ def test_the_same_features_have_the_same_colours_in_map_and_image() -> None:
     assert np.array_equal(project_features(features[:, 2:4, 5:6], mean, deviation), whole[2:4, 5:6])
     assert whole.dtype == np.uint8
     assert len(np.unique(whole)) > 50
-
-
-def stop_at_first(rendering) -> Callable:
-    hear = type(rendering)._hear
-
-    def listen(event) -> None:
-        rendering.stop()
-        hear(rendering, event)
-
-    return listen
 
 
 def wait_for(condition: Callable[[], bool]) -> None:
