@@ -14,7 +14,7 @@ TARGET = Path(__file__).parents[1] / "jobs" / "manifest.schema.json"
 
 
 def main() -> None:
-    TARGET.write_text(json.dumps(schema(), indent=1) + "\n")
+    TARGET.write_text(json.dumps(schema(), indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -90,7 +90,7 @@ def _entry(job: Job, state: BatchState) -> dict[str, Any]:
 def _page(facts: dict[str, Any]) -> str:
     from jinja2 import Environment
 
-    template = files("motion_transfer.batch").joinpath("report.html.j2").read_text()
+    template = files("motion_transfer.batch").joinpath("report.html.j2").read_text("utf-8")
     return Environment(autoescape=True).from_string(template).render(**facts)
 
 
