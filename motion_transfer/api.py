@@ -108,7 +108,7 @@ def render_video(
             done.
         engine: What runs the network, `openvino`, `torch` or `onnx`; else the fastest here.
         precision: What it is computed in, `int8`, `bf16` or `f32`; else the fastest here.
-        device: `cpu`, `cuda`, or `cuda:1`; else `cuda` where it is.
+        device: `cpu`, `cuda`, `cuda:1` or `mps`; else `cuda` where it is.
         frame_rate: Frames per second, exact if given as a string or Fraction.
         codec, crf, pix_fmt: Of a video; else by container and codec.
         alpha: How transparent colours are written.

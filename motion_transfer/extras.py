@@ -24,7 +24,7 @@ class Extra:
 EXTRAS = {
     "heic": Extra("HEIC photos need", {"pillow_heif": "pillow-heif"}),
     "people": Extra("synthetic people need", {"anny": "anny", "warp": "warp-lang"}),
-    "train": Extra("training needs", {"accelerate": "accelerate"}),
+    "train": Extra("training needs", {"accelerate": "accelerate", "psutil": "psutil"}),
     "tensorboard": Extra("curves need", {"tensorboard": "tensorboard"}),
     "adapt": Extra(
         "learning a person needs",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from importlib import import_module
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 MODULES = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL"}
 """What a package is imported as, where it is installed under several names or another than that."""
@@ -26,4 +27,14 @@ def package_version(name: str) -> str:
         with suppress(PackageNotFoundError, KeyError, ValueError, TypeError):  # or no name
             if found := version(other):
                 return found
+    # conda's OpenCV and a build of one's own may have no metadata; the module itself knows
+    with suppress(ImportError):
+        return str(getattr(import_module(MODULES.get(name, name)), "__version__", "unknown"))
     return "unknown"
+
+
+def holders_of(module: str) -> list[str]:
+    """List the distributions that hold a module; of several, the last one overwrote the others."""
+    from importlib.metadata import packages_distributions
+
+    return sorted(set(packages_distributions().get(module, [])))

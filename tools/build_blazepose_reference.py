@@ -55,7 +55,7 @@ def main(arguments: list[str]) -> None:
                 del seen["mask"]
         found[name] = entry
     text = json.dumps(found, separators=(",", ":")).replace('},"', '},\n"')
-    OUTPUT.write_text(text + "\n")
+    OUTPUT.write_text(text + "\n", encoding="utf-8")
 
 
 def watch(frames: list[np.ndarray], *, still: bool) -> list[dict | None]:

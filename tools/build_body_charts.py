@@ -48,7 +48,7 @@ ARM_SLICES = {"upperarm01": (0.17, 0.19), "lowerarm01": (0.41, 0.45), "wrist": (
 
 def read_body(path: Path) -> np.ndarray:
     """Read SMPL vertices (6890, 3), turned to the body model's axes: z up, face towards -y."""
-    lines = (line.split() for line in path.read_text().splitlines())
+    lines = (line.split() for line in path.read_text(encoding="utf-8").splitlines())
     xyz = np.array([[float(x) for x in line[1:4]] for line in lines if line and line[0] == "v"])
     return np.stack([xyz[:, 0], -xyz[:, 2], xyz[:, 1]], axis=1)
 

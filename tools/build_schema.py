@@ -16,7 +16,8 @@ JOBS = Path(__file__).parents[1] / "jobs"
 
 def main() -> None:
     for name, schema in (("manifest", manifest.schema()), ("events", event_lines.schema())):
-        (JOBS / f"{name}.schema.json").write_text(json.dumps(schema, indent=1) + "\n")
+        text = json.dumps(schema, indent=1) + "\n"
+        (JOBS / f"{name}.schema.json").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

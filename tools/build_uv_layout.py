@@ -45,7 +45,7 @@ LIMBS = ((1, 2), (3,), (4,), (5,), (6,), (7, 9), (8, 10), (11, 13), (12, 14), (1
 def read_body(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Vertices (6890, 3), texture coordinates (7576, 2), faces and texture faces (13776, 3)."""
     vertices, texture, faces, texture_faces = [], [], [], []
-    for line in path.read_text().splitlines():
+    for line in path.read_text(encoding="utf-8").splitlines():
         kind, *fields = line.split() or [""]
         if kind == "v":
             vertices.append([float(x) for x in fields[:3]])

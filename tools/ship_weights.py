@@ -43,7 +43,7 @@ def main(name: str, run: Path) -> None:
             old.unlink()
         rows, number, done = [], 1, 0
     recipe = write_toml(forget_folders(config, f"{name}-{number - 1}" if number > 1 else ""))
-    (docs / f"{name}-{number}.toml").write_text(recipe)
+    (docs / f"{name}-{number}.toml").write_text(recipe, encoding="utf-8")
     for step, losses in read_losses(run).items():
         rows.append({"run": number, "step": done + step, **losses})
     write_table(table, rows)
@@ -95,7 +95,7 @@ def find_marks(docs: Path, name: str, rows: list[Row]) -> list[int]:
 
 
 def read_table(path: Path) -> list[Row]:
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         return [
             {name: float(value) if value else None for name, value in row.items()}
             for row in csv.DictReader(file)
@@ -104,7 +104,7 @@ def read_table(path: Path) -> list[Row]:
 
 def write_table(path: Path, rows: list[Row]) -> None:
     terms = [term for term in TERMS if any(term in row for row in rows)]
-    with path.open("w", newline="") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["run", "step", *terms])
         for row in rows:

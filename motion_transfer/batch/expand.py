@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -203,7 +204,7 @@ class _Spread:
         named = (word, value) == ("audio", NO_AUDIO) or (
             word == "weights" and not names_weights_file(value)
         )
-        fixed = named or value.startswith("/") or not _names_file(value)
+        fixed = named or Path(value).is_absolute() or not _names_file(value)
         return _path(value if fixed else f"{self._folder}/{value}")
 
     def _people(self, place: Place, written: Sequence[str | list[str]]) -> list[tuple[str, ...]]:
@@ -272,7 +273,7 @@ class _Spread:
                 f"{self._text.where(place)}: {shown(template)} is a URL; write where it begins as"
                 " output_root, and here what lies below it"
             )
-        written = template.format(**names)
+        written = template.format(**names).replace(os.sep, "/")  # Windows takes either
         try:
             return self._find_output(place, written)
         except (OSError, RuntimeError) as error:  # too long a name; links that go in circles
@@ -289,11 +290,11 @@ class _Spread:
         if folder not in self._real_folders:
             real = Path(folder).resolve()
             inside = real.is_relative_to(self._real_root) and ".." not in Path(written).parts
-            self._real_folders[folder] = str(real), inside and not written.startswith("/")
+            self._real_folders[folder] = real.as_posix(), inside and not Path(written).anchor
         real_folder, inside = self._real_folders[folder]
         if self._manifest.outside_outputs:
             path = str(self._root / written)
-            return _Output(path, str(Path(path).resolve()), written)
+            return _Output(path, Path(path).resolve().as_posix(), written)
         if not inside or name in ("", ".", "..") or Path(path).is_symlink():
             raise ManifestError(
                 f"{self._text.where(place)}: {shown(written)} leaves the output root {self._root};"

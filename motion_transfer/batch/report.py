@@ -151,7 +151,7 @@ def _options_told(options: RenderOptions, state: BatchState) -> dict[str, str]:
 def _page(facts: dict[str, Any]) -> str:
     from jinja2 import Environment
 
-    template = files("motion_transfer.batch").joinpath("report.html.j2").read_text()
+    template = files("motion_transfer.batch").joinpath("report.html.j2").read_text("utf-8")
     environment = Environment(autoescape=True, trim_blocks=True)
     environment.filters |= {"duration": _duration, "moment": _moment}
     return environment.from_string(template).render(**facts)

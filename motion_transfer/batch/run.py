@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -18,6 +17,8 @@ from motion_transfer.batch.report import write_report
 from motion_transfer.batch.schedule import Scheduler, Tally
 from motion_transfer.batch.signals import Signals
 from motion_transfer.batch.state import DONE, TO_DO, BatchState
+from motion_transfer.cores import core_count
+from motion_transfer.devices import count_cuda
 from motion_transfer.errors import InputError
 from motion_transfer.media.publish import explain_disk_errors
 from motion_transfer.option import is_url
@@ -169,6 +170,4 @@ def _open_workers(options: BatchOptions, scratch: Path) -> Workers:
 
 def _default_count() -> int:
     """Count a worker for each GPU, or else for each core."""
-    # as NVIDIA's driver lists them: to ask torch would load it here
-    gpus = len(list(Path("/proc/driver/nvidia/gpus").glob("*")))
-    return gpus or len(os.sched_getaffinity(0))
+    return count_cuda() or core_count()

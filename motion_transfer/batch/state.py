@@ -6,7 +6,6 @@ Whether the files that an output was made from are still the same is told withou
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -15,7 +14,15 @@ from typing import Any
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.publish import explain_disk_errors, extend_name
 from motion_transfer.media.unchanged import content_key
-from motion_transfer.media.work import Journal, WorkFolder, key_of, locked, work_path
+from motion_transfer.media.work import (
+    Journal,
+    WorkFolder,
+    key_of,
+    locked,
+    remove_held,
+    remove_lock,
+    work_path,
+)
 from motion_transfer.option import list_options
 from motion_transfer.render.inputs import appearance_files, audio_files, motion_files
 from motion_transfer.render.options import RenderOptions
@@ -142,8 +149,9 @@ class BatchState:
                 with WorkFolder(output) as work:
                     work.clear()
             try:
-                if is_there:
-                    shutil.rmtree(self.folder)
+                leaves_lock = is_there and remove_held(self.folder)
             except OSError as error:
                 raise OutputError(f"cannot remove {self.folder}: {error.strerror}") from error
+        if leaves_lock:
+            remove_lock(self.folder)
         return len(left) + is_there

@@ -121,7 +121,7 @@ def eval_(
             done=pairs.advance,
         )
     if as_json:
-        click.echo((options.output / "results.json").read_text(), nl=False)
+        click.echo((options.output / "results.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         protocol = results.protocol
         click.echo(table(results.columns, results.methods, protocol.pairs_count))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
-import resource
 import signal
 import sys
 import traceback
@@ -16,6 +16,12 @@ from types import FrameType
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
+
+try:
+    import resource
+except ImportError:  # Windows has no such limits
+    resource = None
 
 from motion_transfer.cli.event_lines import write_line
 from motion_transfer.cli.log import show_log
@@ -43,6 +49,7 @@ COMMANDS = {
     "inspect": "Say what an IUV file, driver, photo, output or weights file holds.",
     "verify": "Whether an output is what its record says: untouched, of these inputs.",
     "info": "Versions, device, renderers, sizes of a run; part names; what made an output.",
+    "completion": "What lets a shell complete commands and options.",
 }
 HOMES = {"demo": "run", "inspect": "info", "models": "info"}
 """Commands that stand in another one's module."""
@@ -118,6 +125,12 @@ class LazyGroup(CommandGroup):
             ctx.ensure_object(dict)["settings"] = settings
         return name, command, rest
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete commands without importing them all, as a shell waits for that."""
+        names = [name for name in COMMANDS if name.startswith(incomplete)]
+        commands = [CompletionItem(name, help=COMMANDS[name]) for name in names]
+        return commands + click.Command.shell_complete(self, ctx, incomplete)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
@@ -154,6 +167,11 @@ def main(arguments: list[str] | None = None) -> int:
     # torch's threads would spin while they wait, and take the cores from decoding and encoding;
     # read when torch is first imported, which no command has done yet
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    # what Apple's GPUs lack, the CPU computes
+    os.environ.setdefault("PYTORCH_ENABLE_MPS_FALLBACK", "1")
+    for stream in (sys.stdout, sys.stderr):  # Windows' old code pages lack many characters
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     settings: dict[str, Any] = {"debug": False}
     try:
         with warnings.catch_warnings():
@@ -254,6 +272,8 @@ def _check_address_space() -> None:
 
     Raises: RenderError.
     """
+    if resource is None:
+        return
     allowed_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
     if allowed_bytes != resource.RLIM_INFINITY and allowed_bytes < LEAST_ADDRESS_SPACE_BYTES:
         raise RenderError(

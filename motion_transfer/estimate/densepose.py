@@ -25,6 +25,7 @@ import torch.nn.functional as F
 from jaxtyping import UInt8
 from torch import Tensor
 
+from motion_transfer.devices import find_device
 from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.estimate.interface import PersonEstimate, check_frame
@@ -151,7 +152,7 @@ def _open_script(path: Path) -> Callable[[Picture], Outputs]:
     """Open a TorchScript model as a function. It runs code of the file."""
     with suppress(ImportError):
         import_module("torchvision")  # exports use its operators: nms, roi_align
-    device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = find_device()
     try:
         module = torch.jit.load(str(path), map_location=device).eval()
     except Exception as error:  # of a damaged file they have no common base

@@ -209,7 +209,7 @@ def open_candidates(
     """
     weights, wish = (
         [find_weights(path) for path in options.weights],
-        Wish(precision=options.precision),
+        Wish(precision=options.precision, device=options.device),
     )
     candidates: list[Candidate] = [
         *(RenderedCandidate(DEFAULT_RENDERER, path, options.background, wish) for path in weights),

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import torch
 
+from motion_transfer.devices import find_device, name_device
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.evaluation.candidates import ResultsFolder, open_candidates
 from motion_transfer.evaluation.deepfashion import TABLE_1, open_table1_pairs
@@ -75,6 +76,7 @@ def evaluate(
     Raises: InputError, OutputError before scoring where it can be known; RenderError.
     """
     check_output(options.output, force=options.force)
+    made_with = _made_with(options.device)
     measures = choose_measures(
         options.metrics,
         weights={"lpips": options.lpips_weights, "fid": options.fid_weights},
@@ -101,10 +103,10 @@ def evaluate(
             methods = summarise_methods(candidates, measures, scored)
             results = Results(protocol, measures.columns, methods, published)
             _write_sheet(finished / SHEET_FILE, scorer, results, scored)
-        (finished / RESULTS_FILE).write_text(results.to_json(_made_with()))
+        (finished / RESULTS_FILE).write_text(results.to_json(made_with), encoding="utf-8")
         columns = [column for measure in measures.pairs for column in measure.columns]
         labels = [candidate.label for candidate in candidates]
-        (finished / SCORES_FILE).write_text(scores_csv(scored, columns, labels))
+        (finished / SCORES_FILE).write_text(scores_csv(scored, columns, labels), encoding="utf-8")
         publish(finished, options.output)
     return results
 
@@ -205,9 +207,9 @@ def _write_sheet(
     write_png(path, draw_sheet(labels, column, chosen, drawn))
 
 
-def _made_with() -> dict[str, str]:
-    device = torch.cuda.get_device_name() if torch.cuda.is_available() else "cpu"
-    return {"motion-transfer": __version__, "torch": torch.__version__, "device": device}
+def _made_with(device: str | None) -> dict[str, str]:
+    name = name_device(find_device(device))
+    return {"motion-transfer": __version__, "torch": torch.__version__, "device": name}
 
 
 def choose_rows(values: Sequence[float], better: str) -> list[tuple[str, int]]:

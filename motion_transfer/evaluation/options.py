@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motion_transfer.cores import core_count
 from motion_transfer.drawing.engines import PRECISIONS
 from motion_transfer.drawing.renderers import DRAFT, RENDERERS
 from motion_transfer.errors import InputError
@@ -104,6 +104,12 @@ class EvaluationOptions:
         METHODS,
         "Numbers that networks are computed in: int8, bf16 or f32; default: as mt run does.",
         choices=PRECISIONS,
+        metavar="NAME",
+    )
+    device: str | None = option(
+        "--device",
+        METHODS,
+        "cpu, cuda, cuda:1 or mps (Apple's GPUs); default: cuda where it is.",
         metavar="NAME",
     )
     results: tuple[Path, ...] = option(
@@ -220,4 +226,4 @@ class EvaluationOptions:
     @property
     def worker_count(self) -> int:
         """How many threads to use: as many as asked for, or one for each core that may be used."""
-        return self.workers or len(os.sched_getaffinity(0))
+        return self.workers or core_count()

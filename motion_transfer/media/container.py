@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import cast
 
@@ -25,6 +25,10 @@ from motion_transfer.media.files import check_readable
 
 LARGEST_PICTURE = 2**27
 """Pixels: 16K (15360 x 8640) fits. A header may claim anything, and its claim becomes memory."""
+
+BY_DESCRIPTOR = hasattr(os, "pread")
+"""Where descriptors are the system's (POSIX). On Windows they are one C library's, and FFmpeg may
+have another: there it asks Python for each piece of a file."""
 
 LISTS = (b"#EXTM3U", b"ffconcat")  # how HLS and FFmpeg's concat begin
 LIST_BYTES = 8
@@ -53,21 +57,27 @@ def open_input(path: Path, what: str = "video") -> Iterator[InputContainer]:
     """
     check_readable(path, what)
     limits = {"max_pixels": str(LARGEST_PICTURE)}
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        options = {"fd": str(descriptor), "protocol_whitelist": "fd"} | limits
-        # a title in another encoding than UTF-8 is no reason to refuse pictures
-        container = av.open("fd:", options=options, metadata_errors="replace")
-    except FFmpegError as error:
-        if os.pread(descriptor, LIST_BYTES, 0).startswith(LISTS):
-            raise InputError(
-                f"{what} {path} is a list of other files and has no pictures or sound itself; name"
-                " one of those files"
-            ) from error
-        raise
-    finally:
-        os.close(descriptor)  # FFmpeg has one of its own
-    with container:
+    with ExitStack() as stack:
+        file = stack.enter_context(path.open("rb", buffering=0))
+        options = {"protocol_whitelist": "fd"} | limits
+        if BY_DESCRIPTOR:
+            options["fd"] = str(file.fileno())
+        try:
+            # a title in another encoding than UTF-8 is no reason to refuse pictures
+            container = av.open(
+                "fd:" if BY_DESCRIPTOR else file, "r", options=options, metadata_errors="replace"
+            )
+        except FFmpegError as error:
+            file.seek(0)
+            if file.read(LIST_BYTES).startswith(LISTS):
+                raise InputError(
+                    f"{what} {path} is a list of other files and has no pictures or sound itself;"
+                    " name one of those files"
+                ) from error
+            raise
+        if BY_DESCRIPTOR:
+            file.close()  # FFmpeg has one of its own
+        stack.enter_context(container)
         codecs = [stream.codec_context for stream in container.streams.video]
         codecs = [codec for codec in codecs if codec is not None]  # of codecs that FFmpeg knows
         for codec in codecs:

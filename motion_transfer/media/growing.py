@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
 import shutil
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -16,6 +15,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from motion_transfer.cores import core_count
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.media.publish import publish
 from motion_transfer.media.structured import parse_json, read_text, shown
@@ -71,7 +71,7 @@ def make_items(
         workers: How many processes; None: one for each core. One means this process.
         done: Called with how many more items are finished.
     """
-    workers = min(workers or len(os.sched_getaffinity(0)), max(1, len(numbers)))
+    workers = min(workers or core_count(), max(1, len(numbers)))
     if workers == 1:
         make = open_maker()
         for number in numbers:
@@ -100,7 +100,7 @@ def make_items(
 def write_whole(file: Path, text: str) -> None:
     """Write a text file whole or not at all."""
     temporary = file.with_name(f".{file.name}.tmp")
-    temporary.write_text(text)
+    temporary.write_text(text, encoding="utf-8")
     publish(temporary, file)
 
 

@@ -9,6 +9,7 @@ import errno
 import hashlib
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -132,7 +133,9 @@ def explain_disk_errors(final: Path) -> Iterator[None]:
             errno.ENOSPC: "the disk is full; free some space or write elsewhere",
             errno.EDQUOT: "the disk quota is used up; free some space or write elsewhere",
             errno.EFBIG: "the file would exceed the largest size allowed here",
-            errno.EACCES: "no permission; write elsewhere",
+            errno.EACCES: "no permission; write elsewhere"
+            if sys.platform != "win32"
+            else "no permission, or a program has it open; close that, or write elsewhere",
             errno.EPERM: "no permission; write elsewhere",
             errno.EROFS: "the file system is read-only; write elsewhere",
             errno.ENOENT: "a folder was removed that it is written in; start again",
@@ -155,11 +158,13 @@ def publish(finished: Path, final: Path) -> None:
         shutil.rmtree(old)
     else:
         finished.replace(final)
-    _sync(final.absolute().parent)  # the new name itself is in there
+    if hasattr(os, "O_DIRECTORY"):  # Windows opens no folders, and keeps names safe by itself
+        _sync(final.absolute().parent, os.O_RDONLY)  # the new name itself is in there
 
 
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+def _sync(path: Path, flags: int = os.O_RDWR) -> None:
+    # Windows makes only those files safe that may be written
+    descriptor = os.open(path, flags)
     try:
         os.fsync(descriptor)
     finally:

@@ -81,10 +81,11 @@ class Journal:
                     line = line[file.write(line) :]
                 os.fsync(file.fileno())
             except OSError:  # a full disk: no later line is believed behind half a line
-                os.truncate(self._path, whole_bytes)
+                file.truncate(whole_bytes)
                 raise
 
 
+LOCK = "lock"
 READ_BYTES = 1 << 20  # at a time, for digests: large enough, and small in memory
 
 
@@ -101,21 +102,45 @@ def locked(folder: Path, what: str) -> Iterator[None]:
         what: Begins the message, such as `cannot write out.mp4`.
     """
     owner = folder / "owner.json"
-    lock = FileLock(folder / "lock", timeout=0)
+    lock = FileLock(folder / LOCK, timeout=0)
     try:
         lock.acquire()
     except Timeout:
         try:
-            who = json.loads(owner.read_text())
+            who = json.loads(owner.read_text(encoding="utf-8"))
             words = f"process {who['process']} on {who['host']}"
         except (OSError, ValueError, KeyError, TypeError):  # it may be writing that just now
             words = "another process"
         raise OutputError(f"{what}: {words} is at work on it; wait for it, or stop it") from None
     try:
-        owner.write_text(json.dumps({"process": os.getpid(), "host": socket.gethostname()}))
+        who = {"process": os.getpid(), "host": socket.gethostname()}
+        owner.write_text(json.dumps(who), encoding="utf-8")
         yield
     finally:
         lock.release()
+
+
+def remove_held(folder: Path) -> bool:
+    """Remove a folder while its lock is held by this process.
+
+    Returns: Whether the lock is left, which Windows keeps; `remove_lock` it when it is released.
+    Raises: OSError.
+    """
+    try:
+        shutil.rmtree(folder)
+    except PermissionError:
+        for item in folder.iterdir():
+            if item.name != LOCK:
+                _remove(item)
+        return True
+    return False
+
+
+def remove_lock(folder: Path) -> None:
+    """Remove a folder of which only its lock is left, unless somebody holds that again."""
+    with suppress(OSError):
+        (folder / LOCK).unlink(missing_ok=True)
+        folder.rmdir()
 
 
 class WorkFolder:
@@ -133,6 +158,7 @@ class WorkFolder:
         self._journal = Journal(self.path / "journal.jsonl")
         self._pieces: dict[str, dict[str, Any]] = {}
         self._writing = threading.Lock()
+        self._leaves_lock = False
 
     def __enter__(self) -> Self:
         """Raises: OutputError if somebody else works there, or it cannot be written."""
@@ -152,13 +178,17 @@ class WorkFolder:
         else:
             self.clear()
         self._lock.__exit__(None, None, None)
+        if self._leaves_lock:
+            remove_lock(self.path)
+            if not self._final.exists():
+                remove_folders(self._made)
 
     def clear(self) -> None:
         """Remove the folder: the output is published, or there is nothing to keep."""
         with suppress(OSError):
             # the journal last: if this is stopped, the next run knows that all is published
-            self._remove_content(but=("journal.jsonl", "lock"))
-        shutil.rmtree(self.path, ignore_errors=True)
+            self._remove_content(but=("journal.jsonl", LOCK))
+            self._leaves_lock = remove_held(self.path)
         self._pieces = {}
         if not self._final.exists():
             remove_folders(self._made)
@@ -208,7 +238,7 @@ class WorkFolder:
         for stray in self.path.glob("*.part-*"):
             _remove(stray)
 
-    def _remove_content(self, but: tuple[str, ...] = ("lock", "owner.json")) -> None:
+    def _remove_content(self, but: tuple[str, ...] = (LOCK, "owner.json")) -> None:
         for item in self.path.iterdir():
             if item.name not in but:
                 _remove(item)

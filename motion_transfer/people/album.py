@@ -134,7 +134,8 @@ def _photograph(options: AlbumOptions, people: PeopleStream, number: int) -> Non
         if options.assets:  # where there are two kinds, each says which it is
             person = {"kind": "painted", **person}
         description = {"number": number, "person": person, "shots": shots}
-        (folder / "person.json").write_text(json.dumps(description, indent=1) + "\n")
+        described = json.dumps(description, indent=1) + "\n"
+        (folder / "person.json").write_text(described, encoding="utf-8")
         folder.chmod(0o755)  # mkdtemp keeps others out
         publish(folder, final)
     except BaseException:

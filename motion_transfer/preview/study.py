@@ -48,7 +48,7 @@ def make_study_app(folder: Path, key: Key, token: str) -> Starlette:
     known = {str(file.relative_to(page)): file for file in page.rglob("*") if file.is_file()}
 
     async def index(_request: Request) -> Response:
-        text = known["index.html"].read_text()
+        text = known["index.html"].read_text("utf-8")
         return Response(text.replace(ROOT_TAG, MARKED_TAG, 1), media_type="text/html")
 
     async def file(request: Request) -> Response:
@@ -86,7 +86,8 @@ def _keep(body: bytes, folder: Path, key: Key) -> str:
     with explain_disk_errors(final):
         folder.mkdir(exist_ok=True)
         part = final.with_name(f".{final.name}.part")
-        part.write_text(json.dumps(json.loads(text), indent=1, ensure_ascii=False) + "\n")
+        written = json.dumps(json.loads(text), indent=1, ensure_ascii=False)
+        part.write_text(written + "\n", encoding="utf-8")
         part.replace(final)
     return final.name
 

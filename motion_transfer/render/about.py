@@ -14,6 +14,7 @@ import torch
 from torch.utils.flop_counter import FlopCounterMode
 
 from motion_transfer.cores import core_count
+from motion_transfer.devices import find_device, name_device
 from motion_transfer.drawing.engines import ANYTHING, ENGINES, choose_execution
 from motion_transfer.drawing.kept_source import inspect_source
 from motion_transfer.drawing.person import find_people
@@ -39,7 +40,7 @@ from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.render.options import is_kept
 from motion_transfer.render.provenance import parse_record
-from motion_transfer.version import __version__, package_version
+from motion_transfer.version import __version__, holders_of, package_version
 from motion_transfer.weights import DEFAULT_WEIGHTS, SHIPPED, find_weights
 from motion_transfer.weights.checkpoint import inspect_checkpoint
 from nhrr_core import PART_GROUPS, PART_NAMES, PRESETS, ModelConfig, NeuralReRenderer
@@ -48,7 +49,10 @@ ORDER_WORDS = {
     "iuv": "iuv (file RGB = I, U, V)",
     "vui": "vui (file RGB = V, U, I, as Caffe2's DensePose writes)",
 }
-PACKAGES = ("torch", "openvino", "numpy", "opencv-contrib-python-headless", "av", "safetensors")
+OPENCV = "opencv-contrib-python-headless"
+"""What is asked for; whichever distribution there is does."""
+
+PACKAGES = ("torch", "openvino", "numpy", "av", "safetensors")
 Facts = dict[str, Any]
 
 
@@ -64,13 +68,14 @@ def describe_parts() -> Facts:
 
 def describe_setup() -> Facts:
     """Tell versions, device, renderers, and what a frame of each preset costs."""
-    on_cuda = torch.cuda.is_available()
-    name = torch.cuda.get_device_name() if on_cuda else platform.processor() or "CPU"
+    device = find_device()
+    name = platform.processor() or "CPU" if device == "cpu" else name_device(device)
     how = choose_execution(ANYTHING, inspect_checkpoint(find_weights(DEFAULT_WEIGHTS)))
     return {
         "motion-transfer": __version__,
         "python": sys.version.split()[0],
         **{package: package_version(package) for package in PACKAGES},
+        **_describe_opencv(),
         "device": f"{name}, {core_count()} cores",
         "nhrr runs on": str(how),
         "engines": {
@@ -85,6 +90,17 @@ def describe_setup() -> Facts:
         "people": install_command("people") if missing_packages("people") else "installed",
         "weights": {name: _describe_shipped(name) for name in SHIPPED},
         "presets": {name: describe_preset(config) for name, config in PRESETS.items()},
+    }
+
+
+def _describe_opencv() -> Facts:
+    """Tell which of OpenCV's distributions is there; two of them overwrite each other's files."""
+    holders = holders_of("cv2") or ["opencv"]
+    if len(holders) == 1:
+        return {holders[0]: package_version(OPENCV)}
+    return {
+        "opencv": f"{' and '.join(holders)} overwrite each other: pip uninstall them all, then"
+        " install one"
     }
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
+from motion_transfer.devices import find_device
 from motion_transfer.drawing.kept_source import load_picture
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS
 from motion_transfer.drawing.source import SourcePicture
@@ -54,7 +55,8 @@ def write_adapted(options: AdaptOptions, output: Path, listener: Listener = igno
     check_destination(output, force=options.force)
     given = {} if options.steps is None else {"steps": options.steps}
     person = part_of(options, SourceOptions)
-    kept = adapt_person(person, options.weights, AdaptationSettings(**given), listener)
+    settings = AdaptationSettings(**given)
+    kept = adapt_person(person, options.weights, settings, listener, device=options.device)
     with work_folder(output) as folder:
         written = folder / output.name
         shutil.copyfile(kept, written)
@@ -69,7 +71,8 @@ def adapt_run(options: RenderOptions, listener: Listener = ignore) -> RenderOpti
     """
     # what is learned is the person, and garments are laid over whoever that is
     person = replace(part_of(options, SourceOptions), garments=())
-    weights = adapt_person(person, options.weights, AdaptationSettings(), listener)
+    settings = AdaptationSettings()
+    weights = adapt_person(person, options.weights, settings, listener, device=options.device)
     return replace(options, weights=weights, adapt=False)
 
 
@@ -78,11 +81,14 @@ def adapt_person(
     weights: Path | None,
     settings: AdaptationSettings,
     listener: Listener = ignore,
+    *,
+    device: str | None = None,
 ) -> Path:
     """Find the weights that have learned a source, or make them, which takes minutes.
 
     Args:
         weights: Before they learn; None: those that ship.
+        device: Where they learn; None: the fastest here.
     Returns: A checkpoint in the cache, whole.
     Raises: InputError and its kinds: a source that cannot be used, or has changed meanwhile;
         missing packages; OutputError if the cache cannot be written.
@@ -101,6 +107,7 @@ def adapt_person(
     if final.is_file():
         return final
     require_extra("adapt")
+    learning = find_device(device)
     # now: it takes seconds, and what was learned before needs none of it
     import torch
 
@@ -109,9 +116,8 @@ def adapt_person(
 
     judge = load_efficientnet_lite0()
     pictures = _read_person(options, listener)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    model = load_checkpoint(before).to(device)
-    adapted = adapt_model(model, pictures, demo_poses(), settings, judge.to(device), listener)
+    model = load_checkpoint(before).to(learning)
+    adapted = adapt_model(model, pictures, demo_poses(), settings, judge.to(learning), listener)
     told = inspect_checkpoint(before).notes | {
         "adapted_from": f"{before.stem}, SHA-256 {facts['weights']}",
         "adapted_to": _tell_person(options),

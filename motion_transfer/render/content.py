@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motion_transfer.cores import CPU_FACTS
+from motion_transfer.devices import name_device
 from motion_transfer.estimate.opening import estimator_facts
 from motion_transfer.media.work import digest_file, key_of
 from motion_transfer.option import list_options
@@ -186,8 +187,6 @@ def _estimator_facts(options: EstimatorOptions) -> dict[str, Any]:
 def describe_machine(name: str) -> list[str]:
     """Tell of a device what computes: another instruction set may round otherwise."""
     if name.startswith("cuda"):
-        import torch
-
-        return [torch.cuda.get_device_name(name)]
-    flags = CPU_FACTS.read_text() if CPU_FACTS.exists() else platform.processor()
+        return [name_device(name)]
+    flags = CPU_FACTS.read_text(encoding="utf-8") if CPU_FACTS.exists() else platform.processor()
     return [platform.machine(), *sorted(set(VECTOR_UNITS.findall(flags)))]

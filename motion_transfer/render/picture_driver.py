@@ -216,7 +216,7 @@ def _source_landmarks(options: SourceOptions) -> Landmarks:
 def _read(iuv: Path, facts: Path, key: str) -> PictureDriver | None:
     """Read what an earlier run made of the same content, if it is there and whole."""
     try:
-        told: dict[str, Any] = json.loads(facts.read_text())
+        told: dict[str, Any] = json.loads(facts.read_text(encoding="utf-8"))
         if told["key"] != key or digest_of(iuv) != told["digest"]:
             return None
         rate = told["frame_rate"]
@@ -238,7 +238,7 @@ def _write(driver: PictureDriver, facts: Path) -> None:
     for name in ("frame_rate", "start_seconds"):
         told[name] = None if told[name] is None else str(told[name])
     written = _temporary(facts)
-    written.write_text(json.dumps(told))
+    written.write_text(json.dumps(told), encoding="utf-8")
     publish(written, facts)
 
 

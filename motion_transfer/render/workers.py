@@ -14,16 +14,14 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import resource_tracker
-from multiprocessing.connection import wait
+from multiprocessing.context import BaseContext
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
 from motion_transfer.cores import core_count, take_share
-from motion_transfer.drawing.engines import has_cuda
-
-ORPHANED = 3  # exit code of a worker whose scheduler is gone
+from motion_transfer.devices import count_cuda
+from motion_transfer.processes import begin_child, deaf
 
 PRELOADED = [
     "motion_transfer.render.composition",
@@ -86,7 +84,6 @@ class LocalWorkers:
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True, mode=0o700)
         self._pools: list[ProcessPoolExecutor | None] = [None] * count
-        resource_tracker.ensure_running()  # which would lift `_deaf` if it began inside it
 
     def submit(self, place: int, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
         pool = self._pools[place]
@@ -95,15 +92,13 @@ class LocalWorkers:
                 return pool.submit(task, *arguments)
             except BrokenProcessPool:
                 pool.shutdown(wait=False)
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(PRELOADED)
         pool = self._pools[place] = ProcessPoolExecutor(
             1,
-            mp_context=context,
+            mp_context=_how_to_begin(),
             initializer=begin_worker,
             initargs=(place, self.count, sys.path, self._share_gpus),
         )
-        with BEGINNING, _deaf(), _without_main():
+        with BEGINNING, deaf(signal.SIGINT), _without_main():
             future = pool.submit(task, *arguments)
         # the worker has its own; with this one open, half a result of a worker that was killed
         # would be waited for without end
@@ -131,13 +126,13 @@ def begin_worker(place: int, count: int, path: list[str], share_gpus: bool) -> N
     """Settle into a worker process: its share of the cores, its GPU, an end with its parent."""
     sys.path[:] = path
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # whatever the command's own handler does
-    threading.Thread(target=_follow_parent, daemon=True).start()
+    begin_child()
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     take_share(max(1, core_count() // count))
-    if share_gpus and has_cuda():
+    if share_gpus and count_cuda():
         import torch
 
-        torch.cuda.set_device(place % torch.cuda.device_count())
+        torch.cuda.set_device(place % count_cuda())
 
 
 class Warm:
@@ -161,14 +156,13 @@ WARM = Warm()
 """Kept by this worker process."""
 
 
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Keep Ctrl-C from processes that begin inside; the scheduler, whose it is, hears it after."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+def _how_to_begin() -> BaseContext:
+    """Choose how workers begin; Apple's frameworks do not survive a fork, and Windows has none."""
+    if sys.platform == "darwin" or "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(PRELOADED)
+    return context
 
 
 @contextmanager
@@ -184,10 +178,3 @@ def _without_main() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = before
-
-
-def _follow_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(ORPHANED)  # a thread cannot end its process in any kinder way

@@ -99,7 +99,7 @@ def write_state(
             random["cuda"] = torch.cuda.get_rng_state()
         torch.save(random, work / "random.pt")
         content = {"step": step, "seconds": seconds, "data": data_digest}
-        (work / STATE).write_text(json.dumps(content, indent=1) + "\n")
+        (work / STATE).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
         work.chmod(0o755)  # a temporary folder is its owner's alone
         publish(work, final)
     return final

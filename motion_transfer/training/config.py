@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 from pydantic import Field, TypeAdapter, ValidationError
 
+from motion_transfer.devices import check_device
 from motion_transfer.errors import InputError
 from motion_transfer.option import option, parse_colour
 
@@ -30,6 +31,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Decay = Annotated[float, Field(ge=0, lt=1)]
 Perceptual = Literal["efficientnet-lite0", "vgg19", "none"]
 Identity = Literal["sphereface", "dlib", "none"]
+AUTO = "auto"
 Precision = Literal["auto", "fp32", "bf16"]
 
 LOSSES = "Losses (the paper's; one without its network is an error)"
@@ -269,11 +271,20 @@ class SpeedSettings:
     """What changes the time a run takes, and its results only in the last digits.
 
     Attributes:
+        device: `cpu`, `cuda`, `cuda:1` or `mps`; `auto`: CUDA devices where there are any, else
+            the CPU.
         precision: `auto` is bf16 where the hardware multiplies it, else fp32.
         workers: -1: half of the cores, at most 4, or all but one for ever new people beside a GPU;
             0: the process that trains reads, or paints, as well.
     """
 
+    device: str = option(
+        "--device",
+        "Speed",
+        "cpu, cuda, cuda:1 or mps (Apple's GPUs); default: cuda where it is.",
+        default=AUTO,
+        metavar="NAME",
+    )
     precision: Precision = "auto"
     compile: bool = option(
         "--compile/--no-compile", "Speed", "Compile; default: no.", kind="switch", default=False
@@ -285,6 +296,11 @@ class SpeedSettings:
         kind="integer",
         default=-1,
     )
+
+    @property
+    def wish(self) -> str | None:
+        """The device that is asked for; None: the fastest here."""
+        return None if self.device == AUTO else self.device
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -339,6 +355,8 @@ class TrainConfig:
             for key, value in vars(getattr(self, section)).items():
                 check_value(f"{section}.{key}", value)
         parse_colour(self.data.background)
+        if self.speed.wish is not None:
+            check_device(self.speed.wish)
         if self.optimiser.half_size:
             # FeatureNet's four down blocks halve a texture to a sixteenth
             for key, multiple in (("image_size", 2**self.model.down_blocks), ("texture_size", 16)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -12,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
-from multiprocessing import connection, get_context, parent_process, resource_tracker
+from multiprocessing import get_context
 
 import cv2
 import numpy as np
@@ -21,6 +20,7 @@ from jaxtyping import Float16, UInt8
 from motion_transfer.drawing.outline import clearance_of
 from motion_transfer.drawing.source import SourcePicture, cut_source, trim_to_alpha
 from motion_transfer.errors import MotionTransferError, TrainingError
+from motion_transfer.processes import begin_child, deaf
 from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.samples import cut_target
 from motion_transfer.training.sources import StreamedPairs, StreamedPhoto
@@ -118,7 +118,6 @@ class Painters:
         if workers:
             # spawned: neither torch's threads nor a GPU survive a fork
             self._pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin_painter)
-            resource_tracker.ensure_running()  # which would be deaf as well if it began inside
             with _starting_painters():
                 self._ask(self._pool)
 
@@ -172,31 +171,23 @@ class Painters:
 
 
 def _begin_painter() -> None:
-    threading.Thread(target=_follow_parent, daemon=True).start()
+    begin_child()
     cv2.setNumThreads(1)
     keep_memory()
-
-
-def _follow_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-        os._exit(1)  # a thread cannot end its process in any kinder way
 
 
 @contextmanager
 def _starting_painters() -> Iterator[None]:
     """Let processes begin inside with one thread and no GPU; Ctrl-C is heard by this one alone."""
-    heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     # libraries read it when they are loaded, which is before a process could say so itself
     before = {name: os.environ.get(name) for name in PAINTERS_ENVIRONMENT}
     os.environ.update(PAINTERS_ENVIRONMENT)
     try:
-        yield
+        with deaf(signal.SIGINT, signal.SIGTERM):
+            yield
     finally:
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-        signal.pthread_sigmask(signal.SIG_SETMASK, heard)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import os
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Protocol
 
+from motion_transfer.cores import core_count
 from motion_transfer.errors import InputError
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.iuv.formats import ChannelOrder
@@ -252,7 +252,7 @@ def _check_pictures(
         except InputError as error:
             return error
 
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(core_count()) as pool:
         try:
             answers: dict[str, InputError | str] = {}
             for name, answer in zip(pictures, pool.map(try_one, pictures.values()), strict=True):

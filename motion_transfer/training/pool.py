@@ -8,11 +8,11 @@ been stopped. Its learning is no worse for that. Albums of a fixed number of peo
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
+import psutil
 import torch
 from torch import Tensor
 
@@ -192,5 +192,5 @@ def _fit(
     if device.type == "cuda":
         room_bytes = torch.cuda.mem_get_info(device)[0] * MOST_OF_GPU
     else:  # taken from the system as it fills
-        room_bytes = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") * MOST_OF_RAM
+        room_bytes = psutil.virtual_memory().total * MOST_OF_RAM
     return max(1, min(wanted, int(room_bytes / each_bytes)))

@@ -18,15 +18,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import torch
-
+from motion_transfer.devices import find_device
 from motion_transfer.errors import InputError, OutputError, WeightsError
 from motion_transfer.extras import require_extra
 from motion_transfer.media.growing import write_whole
 from motion_transfer.media.publish import explain_disk_errors
 from motion_transfer.training.config import (
+    AUTO,
     GPU_RECIPE,
     PEOPLE,
+    SpeedSettings,
     TrainConfig,
     build_config,
     read_settings,
@@ -71,7 +72,9 @@ def plan_new_run(folder: Path, settings: Mapping[str, Any]) -> PlannedRun:
             " another name"
         )
     init = _load_init(str(settings["run.init"])) if settings.get("run.init") else None
-    if settings.get("data.source", PEOPLE) == PEOPLE and torch.cuda.is_available():
+    wish = SpeedSettings(device=str(settings.get("speed.device", AUTO))).wish
+    on_cuda = find_device(wish).startswith("cuda")
+    if settings.get("data.source", PEOPLE) == PEOPLE and on_cuda:
         settings = {**GPU_RECIPE, **settings}
     return PlannedRun(folder, build_config(settings, model=init and init.config), init)
 

@@ -21,6 +21,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
+from motion_transfer.cores import core_count
 from motion_transfer.drawing.outline import clearance_of
 from motion_transfer.drawing.person import bounding_box
 from motion_transfer.drawing.source import SourcePicture, cut_source, unfold_picture
@@ -261,7 +262,7 @@ def count_workers(speed: SpeedSettings, *, beside_gpu: bool = False) -> int:
     """
     if speed.workers >= 0:
         return speed.workers
-    cores = len(os.sched_getaffinity(0))
+    cores = core_count()
     return max(1, cores - 1) if beside_gpu else min(MOST_WORKERS, max(1, cores // 2))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ import torch.nn.functional as F
 from accelerate import Accelerator, DistributedDataParallelKwargs
 from torch import Tensor
 
+from motion_transfer.devices import find_device
 from motion_transfer.errors import InputError, TrainingError
 from motion_transfer.events import Notice
 from motion_transfer.media.pictures.photo import write_png
@@ -353,11 +355,18 @@ class Trainer:
         return bool(self._accelerator.gather(flag).any())  # pyright: ignore[reportAttributeAccessIssue]
 
 
+DEVICE_VARIABLE = "ACCELERATE_TORCH_DEVICE"
+
+
 def make_accelerator(config: TrainConfig) -> Accelerator:
     """Take the devices there are, with the precision that suits them, and gradient accumulation."""
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    wish = config.speed.wish
+    device = torch.device(find_device(wish))
     dtype = choose_precision(config.speed.precision, device)
+    if wish is not None and device.type != "cpu":
+        os.environ[DEVICE_VARIABLE] = wish  # the one way to tell accelerate which
     return Accelerator(
+        cpu=device.type == "cpu",
         mixed_precision="bf16" if dtype == torch.bfloat16 else "no",
         gradient_accumulation_steps=config.optimiser.accumulation,
         # in the first stage RenderNet takes no part, in the second FeatureNet

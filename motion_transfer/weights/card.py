@@ -38,8 +38,8 @@ def write_card(weights: Path, name: str, place: str | None = None) -> str:
         if known.name.endswith(".md"):
             shipped = Path(str(known)).with_suffix(".safetensors")
             if shipped.is_file() and digest_weights(shipped) == digest:
-                story = known.read_text().rstrip()
-    template = here.joinpath("card.md.j2").read_text()
+                story = known.read_text("utf-8").rstrip()
+    template = here.joinpath("card.md.j2").read_text("utf-8")
     return (
         Environment(keep_trailing_newline=True)
         .from_string(template)

@@ -42,8 +42,8 @@ def save_pretrained(
         written = work / "finished"
         written.mkdir()
         shutil.copyfile(weights, written / TENSORS)
-        (written / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
-        (written / CARD).write_text(write_card(weights, name or folder.name, push))
+        (written / CONFIG).write_text(json.dumps(config, indent=2) + "\n", "utf-8")
+        (written / CARD).write_text(write_card(weights, name or folder.name, push), "utf-8")
         publish(written, folder)
     if push is not None:
         _upload(folder, push)

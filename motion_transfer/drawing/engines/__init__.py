@@ -6,14 +6,12 @@ The table is light; an engine's module is imported when it is first opened.
 from __future__ import annotations
 
 import importlib.util
-import re
-import sys
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
+from motion_transfer.devices import count_cuda, find_device
 from motion_transfer.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,9 +23,6 @@ PRECISIONS = ("int8", "bf16", "f32")
 
 WITHOUT_GRAPH = ("dpt",)
 """Variants for which no graph is built: they are there to be compared with."""
-
-DEVICES = re.compile(r"cpu|cuda(:\d+)?")
-CUDA_FILES = ("/dev/nvidiactl", "/dev/dxg")  # Linux's driver, and that of Windows below it
 
 
 @dataclass(frozen=True)
@@ -128,7 +123,7 @@ def choose_execution(wish: Wish, info: CheckpointInfo) -> Execution:
     if not row.installed:
         raise InputError(f"--engine {name} needs {row.package}; pip install {row.package}")
     if device != "cpu":
-        _check_cuda(device, row)
+        _check_device(device, row)
     calibrated = bool(read_ranges(info))
     possible = [one for one in row.precisions if one != "int8" or calibrated]
     precision = wish.precision
@@ -151,38 +146,18 @@ def open_engine(weights: Path, execution: Execution) -> Engine:
     return resolve_name(f"{ENGINES[execution.engine].module}:open_engine")(weights, execution)
 
 
-def check_device(name: str) -> None:
-    """Refuse what is no name of a device. Raises: InputError."""
-    if not DEVICES.fullmatch(name):
-        raise InputError(f"device {name!r}; it is cpu, cuda, or cuda:1 and so on")
-
-
 def _best_device(engine: str | None) -> str:
-    return "cuda" if engine in (None, "torch") and has_cuda() else "cpu"
+    return "cuda" if engine in (None, "torch") and count_cuda() else "cpu"
 
 
 def _best_cpu_engine() -> str:
     return next(name for name in ("openvino", "torch") if ENGINES[name].installed)
 
 
-@cache
-def has_cuda() -> bool:
-    """Whether torch finds a CUDA device; it is not imported where there can be none."""
-    if "torch" not in sys.modules and not any(Path(file).exists() for file in CUDA_FILES):
-        return False
-    import torch
-
-    return torch.cuda.is_available()
-
-
-def _check_cuda(device: str, row: EngineRow) -> None:
+def _check_device(device: str, row: EngineRow) -> None:
     if row.name == "openvino":
         raise InputError(f"--device {device}: openvino runs on CPUs; choose --engine torch")
+    if row.name == "onnx" and device == "mps":
+        raise InputError(f"--device {device}: only torch runs there; choose --engine torch")
     if row.name == "torch":
-        import torch
-
-        count = torch.cuda.device_count() if torch.cuda.is_available() else 0
-        number = int(device.partition(":")[2] or 0)
-        if number >= count:
-            found = f"torch finds {count}" if count else "torch finds none here"
-            raise InputError(f"--device {device}: {found}; choose another, or cpu")
+        find_device(device)

@@ -27,6 +27,7 @@ BATCHES = (48, 24, 16, 12, 8, 6, 4, 3, 2, 1)  # divisors of a chunk's length, wh
 LARGEST_LAYERS = 16  # about so many tensors of the first convolution's size are alive at a time
 MEMORY_SHARE = 0.25  # of what is free
 
+BF16_CPUS = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
 DTYPES = {"bf16": torch.bfloat16, "f32": torch.float32}
 
 
@@ -40,8 +41,11 @@ def choose_dtype(device: torch.device) -> torch.dtype:
     """Choose bf16 where the hardware multiplies it, else float32."""
     if device.type == "cuda":
         return torch.bfloat16 if torch.cuda.is_bf16_supported() else torch.float32
-    fast = torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported()
-    return torch.bfloat16 if fast else torch.float32
+    if device.type != "cpu":  # on Apple's GPUs it was never measured
+        return torch.float32
+    # no public names tell it, and these may go: then 32 bits, which any CPU multiplies
+    told = (getattr(torch.cpu, name, None) for name in BF16_CPUS)
+    return torch.bfloat16 if any(tell() for tell in told if tell) else torch.float32
 
 
 def open_engine(weights: Path, execution: Execution) -> TorchEngine:
@@ -60,7 +64,7 @@ class TorchEngine:
         net = deepcopy(model.render_net).to(device=self._device, dtype=self._dtype)
         self._net = net.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
         self._on_cuda = self._device.type == "cuda"
-        self.occupies: Occupied = "device" if self._on_cuda else "core"
+        self.occupies: Occupied = "core" if self._device.type == "cpu" else "device"
         self._batches: dict[int, int] = {}
         self._lanes: dict[int, Queue[_CudaLane]] = {}
         self._opening = threading.Lock()

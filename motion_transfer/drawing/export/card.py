@@ -56,8 +56,8 @@ def write_card(folder: Path, networks: dict[Path, Network], facts: dict[str, Any
             for file in files_of(path)
         },
     }
-    (folder / FACTS_FILE).write_text(json.dumps(told, indent=2) + "\n")
-    (folder / WORDS_FILE).write_text(_tell(told))
+    (folder / FACTS_FILE).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    (folder / WORDS_FILE).write_text(_tell(told), encoding="utf-8")
 
 
 def files_of(path: Path) -> list[Path]:

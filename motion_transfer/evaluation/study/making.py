@@ -12,6 +12,7 @@ from importlib.resources import files
 from itertools import combinations
 from pathlib import Path
 
+from motion_transfer.cores import core_count
 from motion_transfer.errors import InputError
 from motion_transfer.evaluation.study.items import (
     MethodFolder,
@@ -80,7 +81,7 @@ def make_study(
             files={name: f"{label or 'source'}: {item}" for (label, item), name in blind.items()},
         )
         _write_page(finished / PAGE_FOLDER, key, blind)
-        (finished / KEY_FILE).write_text(json.dumps(key.model_dump(), indent=1) + "\n")
+        (finished / KEY_FILE).write_text(json.dumps(key.model_dump(), indent=1) + "\n", "utf-8")
         publish(finished, options.output)
     return key
 
@@ -138,7 +139,7 @@ def _write_media(
 
     order = _random.sample(list(wanted), len(wanted))
     facts = {}
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(core_count()) as pool:
         for entry, fact in zip(order, pool.map(write, order), strict=True):
             facts[entry] = fact
             done(1, len(order))
@@ -198,7 +199,7 @@ def _write_page(folder: Path, key: Key, blind: dict[tuple[str, str], str]) -> No
         ],
     }
     # a script, as a page that is opened as a file may not fetch one of another kind
-    (folder / DATA_FILE).write_text(f"const STUDY = {json.dumps(data, indent=1)};\n")
+    (folder / DATA_FILE).write_text(f"const STUDY = {json.dumps(data, indent=1)};\n", "utf-8")
     for file in (files("motion_transfer.evaluation.study") / "page").iterdir():
         (folder / file.name).write_bytes(file.read_bytes())
     for path in (*folder.rglob("*"), folder):

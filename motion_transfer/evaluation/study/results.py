@@ -51,8 +51,8 @@ def write_scores(options: ScoreOptions, notice: Say = lambda _words: None) -> tu
     with work_folder(output) as folder:
         finished = folder / "finished"
         finished.mkdir()
-        (finished / RESULTS_FILE).write_text(to_json(scores))
-        (finished / PAGE_FILE).write_text(_page(scores))
+        (finished / RESULTS_FILE).write_text(to_json(scores), encoding="utf-8")
+        (finished / PAGE_FILE).write_text(_page(scores), encoding="utf-8")
         publish(finished, output)
     return scores, output
 
@@ -120,7 +120,9 @@ def interval(ends: tuple[float, float] | None) -> str:
 def _page(scores: Scores) -> str:
     from jinja2 import Environment
 
-    template = files("motion_transfer.evaluation.study").joinpath("results.html.j2").read_text()
+    template = (
+        files("motion_transfer.evaluation.study").joinpath("results.html.j2").read_text("utf-8")
+    )
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     filters: dict[str, Any] = {"percent": percent, "decimal": decimal, "interval": interval}
     environment.filters.update(filters | {"share": share})

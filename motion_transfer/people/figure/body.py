@@ -11,7 +11,6 @@ bone's head and followed by its parent's.
 
 from __future__ import annotations
 
-import fcntl
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -19,6 +18,7 @@ from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
+from filelock import FileLock
 from jaxtyping import Float32, Float64, Int32
 from scipy.sparse import csr_array
 
@@ -28,6 +28,9 @@ from motion_transfer.media.quiet import quiet_libraries
 SHAPE_RANK = 120
 """Directions in which bodies vary, of 310. Measured over 60 random adults, no vertex is more than
 2.2 mm away from where all of them put it, and a shape takes half the time."""
+
+LOCK = ".motion-transfer.lock"
+"""In the cache of `anny`, which several processes would compute at once."""
 
 FIRST_USE = "preparing the body model, once on this machine, two to three minutes"
 
@@ -213,8 +216,7 @@ def load_body_model() -> BodyModel:
     require_extra("people")
     folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / ".motion-transfer.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(folder / LOCK):
         return BodyModel()
 
 

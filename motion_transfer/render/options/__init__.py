@@ -6,11 +6,11 @@ reads: `RenderOptions` is each of its parts.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar
 
+from motion_transfer.cores import core_count
 from motion_transfer.errors import InputError
 from motion_transfer.option import option
 from motion_transfer.render.options.drawn import RendererOptions
@@ -122,4 +122,4 @@ class RenderOptions(OutputOptions, SceneOptions, RendererOptions, InputOptions):
     @property
     def worker_count(self) -> int:
         """How many threads to use: as many as asked for, or one for each core that may be used."""
-        return self.workers or len(os.sched_getaffinity(0))
+        return self.workers or core_count()

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from motion_transfer.drawing.engines import ANYTHING, ENGINES, PRECISIONS, Wish, check_device
+from motion_transfer.devices import check_device
+from motion_transfer.drawing.engines import ANYTHING, ENGINES, PRECISIONS, Wish
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, RENDERERS, RendererRow
 from motion_transfer.errors import InputError
 from motion_transfer.option import option
@@ -58,7 +59,10 @@ class RendererOptions(Part):
         metavar="NAME",
     )
     device: str | None = option(
-        "--device", "Rendering", "cpu, cuda, or cuda:1; default: cuda where it is.", metavar="NAME"
+        "--device",
+        "Rendering",
+        "cpu, cuda, cuda:1 or mps (Apple's GPUs); default: cuda where it is.",
+        metavar="NAME",
     )
 
     def __post_init__(self) -> None:

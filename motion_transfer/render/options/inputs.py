@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from motion_transfer.devices import check_device
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.opening import ESTIMATORS, check_estimator
 from motion_transfer.media.iuv.formats import (
@@ -177,12 +178,20 @@ class AdaptOptions(SourceOptions):
         "How long to learn; the default takes some minutes on two cores.",
         kind="integer",
     )
+    device: str | None = option(
+        "--device",
+        "Learning",
+        "cpu, cuda, cuda:1 or mps (Apple's GPUs); default: cuda where it is.",
+        metavar="NAME",
+    )
     force: bool = option(
         "--force", "Output", "Replace an existing file.", kind="flag", default=False
     )
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.device is not None:
+            check_device(self.device)
         if self.garments:
             raise InputError("weights learn a person, and no garments; give those to `mt run`")
         if self.steps is not None and self.steps < 1:

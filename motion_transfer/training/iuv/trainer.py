@@ -186,7 +186,7 @@ class IuvTraining:
         """
         settings, stopped = self.settings, False
         began, clock = time.monotonic(), Clock()
-        log = (self.run / "log.csv").open("a", buffering=1)
+        log = (self.run / "log.csv").open("a", buffering=1, encoding="utf-8")
         with ThreadPoolExecutor(1) as loader, log:
             # the next batch is made while the network learns from this one
             ahead = loader.submit(self.batch, self.step)

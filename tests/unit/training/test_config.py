@@ -113,6 +113,7 @@ def test_bad_assignments(text: str) -> None:
         ("data.noise", 1.5, "less than or equal to 1"),
         ("losses.texture_weight", float("nan"), "a finite number"),
         ("speed.precision", "fp16", "'auto', 'fp32' or 'bf16'"),
+        ("speed.device", "gpu", "device 'gpu'; it is cpu, mps, or cuda"),
         ("data.views", 1, "greater than or equal to 2"),
         (
             "model.variant",

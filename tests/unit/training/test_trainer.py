@@ -12,6 +12,7 @@ import torch
 from safetensors.torch import load_file
 
 from motion_transfer.errors import InputError, OutputError, TrainingError, WeightsError
+from motion_transfer.training import trainer
 from motion_transfer.training.config import build_config, read_settings
 from motion_transfer.training.progress import Logged, TrainResult
 from motion_transfer.training.runs import plan_new_run, plan_resumed_run, prepare
@@ -278,8 +279,16 @@ def test_runs_on_the_same_photos_may_share_their_textures(run: Run) -> None:
     assert {path: path.stat().st_mtime_ns for path in shared.iterdir()} == before
 
 
+@pytest.mark.parametrize("device", ["cpu", "mps", "cuda:1"])
+def test_the_device_that_is_asked_for_learns(device: str, monkeypatch) -> None:
+    monkeypatch.setenv(trainer.DEVICE_VARIABLE, "cpu")  # put back afterwards
+    monkeypatch.setattr(trainer, "find_device", lambda wish: wish)
+    config = build_config({"speed.device": device, "speed.precision": "fp32"})
+    assert trainer.make_accelerator(config).device == torch.device(device)
+
+
 def test_people_on_a_gpu_have_a_recipe_of_their_own(run: Run, monkeypatch) -> None:
-    monkeypatch.setattr("torch.cuda.is_available", lambda: True)
+    monkeypatch.setattr("motion_transfer.training.runs.find_device", lambda _wish: "cuda")
     shape = {name: value for name, value in run.settings.items() if name.startswith("model.")}
     found = plan_new_run(run.folder, shape).config.optimiser
     assert (found.batch_size, found.learning_rate, found.ema_decay) == (48, 4e-4, 0.998)

@@ -109,7 +109,7 @@ def write_bvh(
     lines = ["HIERARCHY", *_skeleton(body, 0), "MOTION", f"Frames: {len(rows)}"]
     lines += [f"Frame Time: {float(1 / frame_rate):.9f}"]
     lines += [" ".join(f"{number:.5f}" for number in row) for row in rows]
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return len(rows)
 
 

@@ -272,12 +272,27 @@ def test_eight_bits_are_taken_where_the_ranges_are_known(weights: Path, calibrat
         (Wish(engine="torch", precision="int8"), "torch has bf16, f32; choose one of them"),
         (Wish(engine="openvino", device="cuda"), "openvino runs on CPUs; choose --engine torch"),
         (Wish(device="cuda:7"), "torch finds .*; choose another, or cpu"),
+        (Wish(engine="onnx", device="mps"), "only torch runs there; choose --engine torch"),
     ],
     ids=str,
 )
 def test_what_cannot_be_is_said(weights: Path, wish: Wish, words: str) -> None:
     with pytest.raises(InputError, match=words):
         choose_execution(wish, inspect_checkpoint(weights))
+
+
+def test_apples_gpus_run_torch_in_32_bits(weights: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motion_transfer.devices._has_mps", lambda: True)
+    how = choose_execution(Wish(device="mps"), inspect_checkpoint(weights))
+    assert how == Execution("torch", "f32", "mps")
+
+
+def test_a_torch_that_tells_nothing_of_the_cpu_multiplies_32_bits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in torch_engine.BF16_CPUS:
+        monkeypatch.delattr(torch.cpu, name, raising=False)
+    assert torch_engine.fast_precisions("cpu") == ["f32"]
 
 
 def test_a_missing_library_is_named(weights: Path, monkeypatch: pytest.MonkeyPatch) -> None:
