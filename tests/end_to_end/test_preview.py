@@ -27,7 +27,7 @@ from motion_transfer.estimate.models import missing_models
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
 expect = playwright.expect
-expect.set_options(timeout=30_000)  # ms; the network draws a frame in 1 s on two idle cores
+expect.set_options(timeout=90_000)  # ms; the network draws a frame in 1 s on two idle cores
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -151,11 +151,11 @@ def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
     def open_link(link: str, *, first: str = "#over[data-view=result]", **how: Any) -> Any:
         page = browser.new_page(**how)
         pages.append(page)
-        page.set_default_timeout(15_000)
+        page.set_default_timeout(90_000)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda message: complain(message))
         page.goto(link)
-        page.wait_for_selector(first, timeout=30_000)
+        page.wait_for_selector(first)
         return page
 
     def complain(message: Any) -> None:
@@ -191,7 +191,7 @@ def pixel(page: Any, x: int, y: int) -> list[int]:
     return image.evaluate(PIXEL, [x, y])
 
 
-def until(holds: Callable[[], bool], seconds: float = 15) -> None:
+def until(holds: Callable[[], bool], seconds: float = 60) -> None:
     """Wait for what no locator can tell; the page's policy lets no script look out for it."""
     end = time.monotonic() + seconds
     while not holds():
