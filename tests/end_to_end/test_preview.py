@@ -597,11 +597,13 @@ def test_from_a_dropped_photo_to_a_downloaded_video(tmp_path, open_page) -> None
             link.click()
         downloading.value.save_as(tmp_path / "got.webm")
         assert downloading.value.suggested_filename == "my_wave.webm"
+        page.close()  # before the server ends, which it would complain of
     with av.open(str(tmp_path / "got.webm")) as container:
         assert sum(1 for _ in container.decode(video=0)) == 30
     with previewing(tmp_path) as again:  # what was made is still at hand
         page = open_page(again.link, first="#renders li")
         expect(page.get_by_role("link", name="Download my_wave.webm")).to_be_visible()
+        page.close()
 
 
 @pytest.mark.skipif(bool(missing_models()), reason="needs `mt models fetch`")
@@ -625,6 +627,7 @@ def test_a_clip_is_estimated_with_time_left_and_can_be_given_up(tmp_path, open_p
         press(page, "Render")
         expect(page.locator("#renders li")).to_contain_text("Done in", timeout=120_000)
         assert "searched" not in page.locator("#renders li").inner_text()
+        page.close()
 
 
 def test_a_broken_frame_says_so_and_the_others_work(tmp_path, open_page, browser) -> None:
