@@ -50,20 +50,16 @@ def ended(queue: RenderQueue, number: int) -> Render:
     return queue.get(number)
 
 
-def stop_when_some_is_done(queue: RenderQueue, number: int) -> None:
+def stop_when_some_is_done(queue: RenderQueue, wanted: int) -> None:
     """Stop a run as soon as its first pieces are finished."""
     hear = queue._hear
 
-    def listen(of: int, event) -> None:
-        progress = queue.get(of).progress
-        if (
-            of == number
-            and progress
-            and progress.stage == "render"
-            and progress.done > CHUNK_FRAMES
-        ):
+    def listen(number: int, event) -> None:
+        progress = queue.get(number).progress
+        is_drawing = progress is not None and progress.stage == "render"
+        if number == wanted and is_drawing and progress.done > CHUNK_FRAMES:
             queue.stop(number)
-        hear(of, event)
+        hear(number, event)
 
     queue._hear = listen
 
