@@ -19,6 +19,7 @@ FROM_REPOSITORY = {
     "CHANGELOG.md": "changelog.md",
     "CITATION.cff": "citation.md",
     "CONTRIBUTING.md": "contributing.md",
+    ".github/SECURITY.md": "security.md",
     "NOTICE": "notice.md",
     "benchmarks/README.md": "benchmarks.md",
     "jobs/README.md": "jobs.md",

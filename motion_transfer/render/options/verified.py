@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from motion_transfer.drawing.engines import ENGINES, PRECISIONS, check_device
+from motion_transfer.devices import check_device
+from motion_transfer.drawing.engines import ENGINES, PRECISIONS
 from motion_transfer.errors import InputError
 from motion_transfer.option import option
 from motion_transfer.render.options.part import Part
