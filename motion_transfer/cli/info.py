@@ -11,6 +11,7 @@ import click
 from motion_transfer.cli.options import FILE, CommandGroup
 from motion_transfer.cli.progress import choose_listener, long_wait
 from motion_transfer.cli.terminal import tell
+from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.formats import ChannelOrder
 
 
@@ -29,6 +30,8 @@ def info(topic: str, as_json: bool) -> None:
     from motion_transfer.render.about import describe_parts, describe_path, describe_setup
 
     topics = {"all": describe_setup, "parts": describe_parts}
+    if topic not in topics and not Path(topic).exists():
+        raise InputError(f"{topic} does not exist, and is no topic either; those are all and parts")
     _tell(topics[topic]() if topic in topics else describe_path(Path(topic)), as_json)
 
 

@@ -158,13 +158,15 @@ def publish(finished: Path, final: Path) -> None:
         shutil.rmtree(old)
     else:
         finished.replace(final)
-    if hasattr(os, "O_DIRECTORY"):  # Windows opens no folders, and keeps names safe by itself
-        _sync(final.absolute().parent, os.O_RDONLY)  # the new name itself is in there
+    _sync(final.absolute().parent)  # the new name itself is in there
 
 
-def _sync(path: Path, flags: int = os.O_RDWR) -> None:
-    # Windows makes only those files safe that may be written
-    descriptor = os.open(path, flags)
+def _sync(path: Path) -> None:
+    is_posix = hasattr(os, "O_DIRECTORY")
+    if path.is_dir() and not is_posix:  # Windows opens no folders, and keeps names safe by itself
+        return
+    # and makes only those files safe that may be written
+    descriptor = os.open(path, os.O_RDONLY if is_posix else os.O_RDWR)
     try:
         os.fsync(descriptor)
     finally:

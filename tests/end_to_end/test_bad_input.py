@@ -237,7 +237,10 @@ USAGE = {
         "no option --sauce; did you mean --source? See `mt run --help`",
     ),
     "unknown command": (["rum"], "no command 'rum'; did you mean run? See `mt --help`"),
-    "unknown topic": (["info", "hats"], "'hats' is not one of"),
+    "unknown topic": (
+        ["info", "hats"],
+        "hats does not exist, and is no topic either; those are all and parts",
+    ),
 }
 
 

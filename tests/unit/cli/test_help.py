@@ -96,8 +96,9 @@ def test_public_names() -> None:
     import motion_transfer
 
     assert sorted(motion_transfer.__all__) == [
-        *("Garment", "MotionTransferError", "Partner", "RenderOptions", "RenderReport"),
-        *("__version__", "render_video"),
+        *("EncodedSource", "Garment", "MotionTransfer", "MotionTransferError", "Partner"),
+        *("RenderOptions", "RenderReport", "RenderedFrames"),
+        *("__version__", "estimate_frames", "render_video"),
     ]
     for name in motion_transfer.__all__:
         assert getattr(motion_transfer, name) is not None
