@@ -173,16 +173,17 @@ def test_real_people_look_as_densepose_sees_them(mt, tmp_path: Path, samples: Pa
 
 def test_the_preview_of_a_clip_shows_its_pictures(tmp_path: Path) -> None:
     from motion_transfer.preview.session import Session
+    from motion_transfer.preview.state import describe
     from motion_transfer.render.options import RenderOptions
 
     clip = film_of_the_astronaut(tmp_path / "clip.mp4", 5)
     options = RenderOptions(
         source=(ASTRONAUT,), driver=clip, output=tmp_path / "out.mp4", renderer="texture"
     )
-    session = Session(options, tmp_path / "job.yaml")
+    session = Session(options, tmp_path / "home", tmp_path / "job.yaml")
     try:
         session.wait_for_plan()
-        assert session.state()["driver"]["pictures"]
+        assert describe(session)["driver"]["pictures"]
         shown = {
             view: cv2.imdecode(
                 np.frombuffer(session.ask_frame(3, view, session.key).result(), np.uint8),

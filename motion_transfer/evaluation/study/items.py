@@ -36,7 +36,10 @@ def item_name(stem: str) -> str:
     Every pattern of `motion_transfer.evaluation.candidates.PATTERNS` becomes the first of them; a
     name in none of them stays as it is.
     """
-    bare = re.sub(rf"({PICTURE_ENDINGS})(?=___|$)", "", stem.removesuffix("_vis"), flags=re.I)
+    bare = stem.removesuffix("_vis")
+    strip = rf"({PICTURE_ENDINGS})_(?!_)(?=.*({PICTURE_ENDINGS})$)"  # as DSC's code joins two names
+    bare = re.sub(strip, "__", bare, flags=re.I)
+    bare = re.sub(rf"({PICTURE_ENDINGS})(?=___|$)", "", bare, flags=re.I)
     return re.sub("___|_2_", "__", bare)
 
 
