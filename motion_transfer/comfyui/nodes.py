@@ -62,7 +62,19 @@ class Encoded:
     person: EncodedSource
 
 
-class LoadSource:
+class _FileNode:
+    """A node that may name a file of the input folder: checked before it runs, known by content."""
+
+    @classmethod
+    def VALIDATE_INPUTS(cls, file: str) -> bool | str:
+        return host.explain(file)
+
+    @classmethod
+    def IS_CHANGED(cls, file: str, **_others: Any) -> str:
+        return host.key_of_input(file)
+
+
+class LoadSource(_FileNode):
     """The photo of a person."""
 
     CATEGORY = CATEGORY
@@ -89,14 +101,6 @@ class LoadSource:
                 "iuv": _socket("IMAGE", "The photo's IUV: I, U and V as red, green and blue."),
             },
         }
-
-    @classmethod
-    def VALIDATE_INPUTS(cls, file: str) -> bool | str:
-        return host.explain(file)
-
-    @classmethod
-    def IS_CHANGED(cls, file: str, **_others: Any) -> str:
-        return host.key_of_input(file)
 
     def load(
         self,
@@ -161,7 +165,7 @@ class EstimateIuv:
         return iuv, people
 
 
-class LoadDriver:
+class LoadDriver(_FileNode):
     """The motion."""
 
     CATEGORY = CATEGORY
@@ -184,14 +188,6 @@ class LoadDriver:
             },
             "optional": {"iuv": _socket("IMAGE", "IUV frames, as Estimate IUV gives them.")},
         }
-
-    @classmethod
-    def VALIDATE_INPUTS(cls, file: str) -> bool | str:
-        return host.explain(file)
-
-    @classmethod
-    def IS_CHANGED(cls, file: str, **_others: Any) -> str:
-        return host.key_of_input(file)
 
     def load(
         self, file: str, person: str, frames: str, missing: str, iuv: Tensor | None = None
