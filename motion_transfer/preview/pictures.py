@@ -62,16 +62,19 @@ class Pictures:
         Raises: StaleError; InputError if there is no such view or frame.
         """
         driver, plans = looked.driver, looked.plans
-        options = draft_of(looked.options) if draft else looked.options
+        options = replace(draft_of(looked.options) if draft else looked.options, compare=False)
+        behind = "white" if options.transparent else options.background  # panels have no alpha
+        beside = replace(options, compare=True, background=behind)
         calls: dict[str, Callable[[], np.ndarray]] = {
             "result": lambda: show_alpha(self.views.result(options, driver, plans, index)),
+            "beside": lambda: self.views.result(beside, driver, plans, index),
             "iuv": lambda: self.views.iuv(driver, index),
             "features": lambda: self.views.feature_image(options, driver, plans, index),
             "pictures": lambda: _proxy(looked, index),
         }
         if view not in calls:
             raise InputError(f"view {view!r}; supported are {', '.join(calls)}")
-        if looked.is_empty and view in ("result", "features"):
+        if looked.is_empty and view in ("result", "beside", "features"):
             raise InputError(NOBODY)
         if not 0 <= index < driver.frame_count:
             raise InputError(f"frame {index}; the driver has {driver.frame_count}, from 0")

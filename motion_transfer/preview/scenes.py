@@ -13,13 +13,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from motion_transfer.drawing.backgrounds import Frame, fit_picture, make_background
-from motion_transfer.drawing.canvas import Canvas, Figure, Picture, Spot, show_alpha
+from motion_transfer.drawing.canvas import Canvas, Figure, Picture, Spot
 from motion_transfer.drawing.light import match_light
 from motion_transfer.drawing.renderers.interface import Renderer
 from motion_transfer.drawing.source import Source
 from motion_transfer.errors import InputError
-from motion_transfer.option import parse_background
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.render.backdrop import (
     Backdrop,
@@ -27,14 +25,12 @@ from motion_transfer.render.backdrop import (
     OpenBackdrop,
     light_of,
     no_pictures,
-    open_background,
 )
 from motion_transfer.render.options import DEFAULT_RATE, RenderOptions
 from motion_transfer.render.placing import place_in_square, place_people
 from motion_transfer.render.scene import make_backdrop, make_canvas, person_light
 
 KEPT = 4  # results of each step: some options back and forth without waiting
-THUMB_SIZE = (90, 120)  # height and width, px: of a tile of the page, for dense screens
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +63,14 @@ class Scenes:
     def frame(
         self, options: RenderOptions, driver: PreviewedDriver, plans: FramePlans, index: int
     ) -> Picture:
-        """Draw an output frame, without a comparison. Raises: InputError, WeightsError."""
+        """Draw an output frame. Raises: InputError, WeightsError."""
         everyone = [plans, *self._plan_partners(options, driver, plans)]
         lead_side = self._renderer_of(options).working_size(plans.largest_side)
         reader = driver.opened.reader
         rate = options.frame_rate or driver.opened.frame_rate or DEFAULT_RATE
         # the options that can be changed and leave what is behind as it is
         same = {"driver_person": "largest", "window": "auto", "frames": (None, None)}
-        plain = replace(options, compare=False, frame_rate=rate, place=None, **same)
+        plain = replace(options, frame_rate=rate, place=None, **same)
         scene = self._scene(plain, driver, reader.height, reader.width, lead_side)
         spots = self._place(options, everyone, (reader.height, reader.width), scene.canvas)
         figures = []
@@ -144,22 +140,3 @@ class Scenes:
     def _make_table(self, member: RenderOptions, scene: _Scene) -> np.ndarray:
         around = light_of(scene.backdrop, scene.frame_count)
         return match_light(person_light(self._source_of(member)), around)
-
-
-def draw_thumb(options: RenderOptions, source: Source | None) -> Frame:
-    """Draw a background as small as a tile of the page.
-
-    Raises: InputError if it cannot be read.
-    """
-    if options.transparent:
-        return show_alpha(np.zeros((*THUMB_SIZE, 4), np.uint8))
-    path = options.background_file
-    if options.background == "driver":
-        path = options.driver
-    if path is not None:
-        return fit_picture(next(open_background(path).read()), THUMB_SIZE, "cover")
-    if options.background == "photo":
-        if source is None:
-            raise InputError("the photo is being read; try again in a moment")
-        return make_background("photo", THUMB_SIZE, source, in_place=False)
-    return np.full((*THUMB_SIZE, 3), parse_background(options.background), np.uint8)

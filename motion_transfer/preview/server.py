@@ -90,6 +90,7 @@ def make_app(session: Future[Session], token: str, closing: Callable[[], bool]) 
         Route("/source", handlers.choose_sources, methods=["POST"]),
         Route("/garments", handlers.choose_garments, methods=["POST"]),
         Route("/motion", handlers.choose_motion, methods=["POST"]),
+        Route("/motion/{number}", handlers.motion_picture),
         Route("/motion/cancel", handlers.cancel_motion, methods=["POST"]),
         Route("/background/{number}", handlers.background_picture),
         Route("/renders", handlers.render, methods=["POST"]),
@@ -189,6 +190,11 @@ class _Handlers:
         """Send a small picture of a background."""
         number = _number(request, "background")
         return await self._picture(request, (await self._session()).ask_background(number))
+
+    async def motion_picture(self, request: Request) -> Response:
+        """Send a small picture of a motion."""
+        number = _number(request, "motion")
+        return await self._picture(request, (await self._session()).ask_motion_picture(number))
 
     async def choose_sources(self, request: Request) -> Response:
         """Take some of the known sources, the one that leads first; as before if one is unfit."""

@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from motion_transfer.drawing.renderers import RENDERERS
 from motion_transfer.drawing.source import Source
-from motion_transfer.errors import InputError, OutputError
+from motion_transfer.errors import InputError
 from motion_transfer.events import Event, FramesDone, Stage
-from motion_transfer.media.output.formats import OUTPUT_KINDS
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import SCENES, list_options, parse_background, read_whole
+from motion_transfer.option import SCENES
+from motion_transfer.preview.changes import SCENE, change_options
 from motion_transfer.preview.choices import Choice, built_in_motions, example_people
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.preview.dropped import DroppedFiles, clean_name
@@ -30,28 +29,18 @@ from motion_transfer.preview.opening import Opening
 from motion_transfer.preview.pictures import NOBODY, Looked, Pictures, draft_of
 from motion_transfer.preview.progress import Progress, explain
 from motion_transfer.preview.renders import RenderQueue
-from motion_transfer.preview.scenes import draw_thumb
-from motion_transfer.preview.views import Views, count_people, shrink
+from motion_transfer.preview.thumbs import draw_background, draw_motion, shrink
+from motion_transfer.preview.views import Views, count_people
 from motion_transfer.render.backdrop import no_pictures, open_background
-from motion_transfer.render.composition import cast_files, read_format
+from motion_transfer.render.composition import cast_files
 from motion_transfer.render.inputs import find_source_iuv, is_clip, iuv_names
 from motion_transfer.render.options import (
-    NO_AUDIO,
     Garment,
     RenderOptions,
-    SceneOptions,
     is_kept,
     parse_parts,
 )
 from motion_transfer.render.source_pictures import first_picture
-
-SCENE = tuple(entry.name for entry in list_options(SceneOptions) if entry.name != "partners")
-SHOWN_AS_IS = ("renderer", *SCENE, "person", "driver_person", "size", "crf", "audio")
-CHANGEABLE = (*SHOWN_AS_IS, "window", "frames", "frame_rate")
-NAMING = ("name", "format")
-"""What the output is called, in its folder: two words of the page that are no options."""
-
-FORMATS = tuple(suffix for row in OUTPUT_KINDS.values() for suffix in row.suffixes if suffix)
 
 
 class Session:
@@ -161,7 +150,7 @@ class Session:
         scene = [getattr(o, name) for name in SCENE]
         who = (o.sources, o.person, o.garments, o.driver, o.driver_person)
         planned = plans and (plans.shots, plans.exact, plans.chosen)
-        drawn = (o.renderer, scene, o.size, who, planned)
+        drawn = (o.renderer, scene, o.size, who, o.missing, planned)
         return hashlib.sha256(repr(drawn).encode()).hexdigest()[:12]
 
     def ask_frame(self, index: int, view: str, key: str, *, draft: bool = False) -> Future[bytes]:
@@ -211,7 +200,14 @@ class Session:
         plain = {"size": "driver", "match_colours": False}  # whatever the background is
         options = replace(self.options, background=backgrounds[number], **plain)
         name = ("background", options.background, options.source, options.driver, options.person)
-        return self.pictures.ask(name, lambda: draw_thumb(options, self.source), "background")
+        return self.pictures.ask(name, lambda: draw_background(options, self.source), "background")
+
+    def ask_motion_picture(self, number: int) -> Future[bytes]:
+        """Ask for a small picture of a motion that can be chosen."""
+        if not 0 <= number < len(self.motions):
+            raise InputError(f"there is no motion {number}")
+        path = self.motions[number].path
+        return self.pictures.ask(("motion", path), lambda: draw_motion(path), "motion")
 
     def _note_broken(self, driver: PreviewedDriver, index: int) -> None:
         if index in driver.broken:
@@ -225,15 +221,16 @@ class Session:
         Raises: InputError for an option that is none, a value that it cannot have, or one that does
             not fit this source and driver.
         """
-        known = (*CHANGEABLE, *NAMING)
-        if unknown := [word for word in words if word not in known]:
-            raise InputError(f"option {unknown[0]!r}; here one can set {', '.join(known)}")
-        changed = replace(self.options, **self._parse(words))
-        if not {*NAMING, "crf"}.isdisjoint(words):
-            _check_output(changed)
+        driver = self.driver
+        changed = change_options(
+            self.options,
+            words,
+            frame_count=driver and driver.frame_count,
+            weights=self._weights,
+        )
         if "background" in words:
             self._check_background(changed)
-        if self.driver is not None and self.driver.opened.pictures and "driver_person" in words:
+        if driver is not None and driver.opened.pictures and "driver_person" in words:
             raise InputError(
                 "whom to follow in raw pictures is decided when they are read; start again with"
                 f" --driver-person {changed.driver_person}"
@@ -248,42 +245,17 @@ class Session:
                 self._errors.pop("inputs", None)
             if self.driver is not None:
                 self.plans = plan_frames(self.driver, changed)
+            reopens = changed.missing != self.options.missing  # which a folder is read by
             self.options = changed
+            if reopens:
+                self.opening.give_up()
+                self.opening = self._open()
             self._named = self._named or "name" in words
             self.opening.errors.pop("plan", None)
             if source is not None:
                 self.source = source
                 self._errors.pop("source", None)
         self._touch()
-
-    def _parse(self, words: Mapping[str, Any]) -> dict[str, Any]:
-        entries = {entry.name: entry for entry in list_options(RenderOptions)}
-        given = {name: value for name, value in words.items() if name not in NAMING}
-        if "crf" in given:
-            given["crf"] = _read_crf(given["crf"])
-        if "audio" in given:
-            given["audio"] = given["audio"] or None
-            if given["audio"] not in (None, NO_AUDIO, str(self.options.audio)):
-                raise InputError(f"sound {given['audio']!r}; here it is the motion's own, or none")
-        parsed = {name: entries[name].read(value) for name, value in given.items()}
-        if self.driver is not None and parsed.get("frames") == (0, self.driver.frame_count):
-            parsed["frames"] = (None, None)
-        if "renderer" in parsed:  # weights go with the network, and come back with it
-            row = RENDERERS.get(parsed["renderer"])  # an unknown one is refused with the others
-            parsed["weights"] = self._weights if row and row.default_weights else None
-        if "background" in parsed:
-            parsed = {**_that_goes_with(parsed["background"], self.options), **parsed}
-        if not words.keys().isdisjoint(NAMING):
-            output = self.options.output
-            suffix = words.get("format", output.suffix)
-            if suffix not in (*FORMATS, output.suffix):
-                raise InputError(f"format {suffix!r}; supported are {', '.join(FORMATS)}")
-            # a name, and no path: the page writes nowhere but beside what was chosen
-            name = clean_name(f"{words.get('name', output.stem)}{suffix}")
-            parsed["output"] = output.with_name(name)
-            if suffix != output.suffix:  # which has its own codecs, and its own quality
-                parsed = {"codec": None, "pix_fmt": None, "crf": None, **parsed}
-        return parsed
 
     def _name_output(self) -> None:
         """Call the output after source and driver, where nobody has named it."""
@@ -546,28 +518,3 @@ class Session:
 
 class _ClosingError(Exception):
     """The preview ends while a source is being read."""
-
-
-def _read_crf(text: str) -> int | None:
-    try:
-        return read_whole(text) if text else None
-    except ValueError:
-        raise InputError(f"crf {text!r}; write a whole number, or nothing") from None
-
-
-def _check_output(options: RenderOptions) -> None:
-    """Raise InputError for an output that cannot be written, or not be so good."""
-    try:
-        read_format(options)
-    except OutputError as error:
-        raise InputError(str(error)) from error
-
-
-def _that_goes_with(background: str, options: RenderOptions) -> dict[str, Any]:
-    """Give up what another background cannot have."""
-    given_up: dict[str, Any] = {}
-    if options.size == "background" and not isinstance(parse_background(background), Path):
-        given_up["size"] = "driver"
-    if background == "transparent":
-        given_up["match_colours"] = False
-    return given_up

@@ -11,9 +11,10 @@ from motion_transfer.drawing.window import Window
 from motion_transfer.errors import OutputError
 from motion_transfer.media.codecs import CODECS
 from motion_transfer.media.output.formats import CONTAINERS, OUTPUT_KINDS
+from motion_transfer.preview.changes import FORMATS, SHOWN_AS_IS
 from motion_transfer.preview.dropped import MOST_BYTES, MOST_FILE_BYTES
 from motion_transfer.preview.export import command_line
-from motion_transfer.preview.session import FORMATS, SHOWN_AS_IS, Session
+from motion_transfer.preview.session import Session
 from motion_transfer.render.composition import read_format
 from motion_transfer.render.options import DEFAULT_RATE, SIZES, RenderOptions, parse_window
 from motion_transfer.render.scene import frame_size
@@ -146,7 +147,8 @@ def _quality(options: RenderOptions, size: dict[str, int] | None) -> dict[str, A
         codec = CODECS[read_format(options).codec_name] if suffix in CONTAINERS else None
     except OutputError as error:
         fault = str(error)
-    if codec and size and codec.needs_even_size and (size["width"] % 2 or size["height"] % 2):
+    odd = bool(size) and (size["height"] % 2 or (size["width"] % 2 and not options.compare))
+    if codec and codec.needs_even_size and odd:
         fault = f"{suffix} needs even sides; choose the frame size “as the driver, even”"
     return {
         "fault": fault,

@@ -34,7 +34,6 @@ from motion_transfer.render.source import read_source
 KEPT = 4  # results of each step: some options back and forth without waiting
 COLOUR_SEED = 0  # any: so that a map has the same colours in every session
 COLOUR_SPREAD = 2.5  # standard deviations of the projected map that the colours span, each way
-LONGEST_THUMB_SIDE = 240  # px: three times a tile of the page, for dense screens and tall photos
 LONGEST_PROXY_SIDE = 720  # px: as large as the page shows a frame
 
 
@@ -141,13 +140,6 @@ def write_frame(options: RenderOptions, index: int, output: Path) -> None:
         picture = Views().result(options, driver, plan_frames(driver, options), index)
         write_png(folder / "frame.png", picture, Mark(source_type_of(options)).xmp())
         publish(folder / "frame.png", output)
-
-
-def shrink(picture: Frame) -> Frame:
-    """Make a picture as small as its longer side in the page's list of photos."""
-    scale = min(1, LONGEST_THUMB_SIDE / max(picture.shape[:2]))
-    size = max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale))
-    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def write_proxies(clip: Path, folder: Path, stop: threading.Event) -> None:

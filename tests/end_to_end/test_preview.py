@@ -37,7 +37,17 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs a chromium")
 DEMO = Path(str(files("motion_transfer.demo")))
 FRAMES, SIDE_PX = 120, 320  # of the demo's driver
 START_SECONDS = 60
-VIEWS = ("Result", "Compare", "IUV", "Person", "Partial texture", "Feature map", "Feature image")
+VIEWS = {
+    "Result": "result",
+    "Compare": "result",
+    "Side by side": "beside",
+    "IUV": "iuv",
+    "Person": "source",
+    "Partial texture": "texture",
+    "Feature map": "map",
+    "Feature image": "features",
+}
+"""What each of the buttons shows in the upper layer."""
 UNTOUCHED = {
     "renderer": "texture",
     "background": "white",
@@ -46,6 +56,8 @@ UNTOUCHED = {
     "frames": [0, FRAMES],
     "frame_rate": "15",
     "window": None,
+    "compare": False,
+    "missing": "",
 }
 CONTROLS = "[...document.querySelectorAll('button, input, select, [role=slider], summary')]"
 DROP = """([files, over, target]) => {
@@ -324,9 +336,7 @@ def test_each_view_shows_its_own_picture(page, preview) -> None:
     page.get_by_label("Frame", exact=True).fill("40")
     shown = set()
     press(page, "Inside")
-    for name, view in zip(
-        VIEWS, ("result", "result", "iuv", "source", "texture", "map", "features"), strict=True
-    ):
+    for name, view in VIEWS.items():
         press(page, name)
         expect(page.get_by_role("button", name=name, exact=True)).to_have_attribute(
             "aria-pressed", "true"
@@ -335,6 +345,37 @@ def test_each_view_shows_its_own_picture(page, preview) -> None:
         assert page.get_by_alt_text(re.compile(".+")).count() >= 1
         shown.add(page.locator("#over").get_attribute("src"))
     assert len(shown) >= len(VIEWS) - 1
+
+
+def test_a_motion_is_chosen_by_its_picture(page) -> None:
+    tiles = page.get_by_role("button", name=re.compile("^Motion: "))
+    dance = page.get_by_role("button", name="Motion: Dance", exact=True)
+    expect(dance).to_have_attribute("aria-pressed", "true")
+    for picture in tiles.locator("img").all():
+        picture.scroll_into_view_if_needed()
+        until(lambda picture=picture: picture.evaluate("image => image.naturalWidth") == 120)
+    assert tiles.locator("img").count() == tiles.count()
+
+
+def test_all_three_are_seen_and_written_side_by_side(page, preview) -> None:
+    """What the view shows is what the file holds: the photo, the IUV, the result."""
+    (preview.folder / "out.webm").unlink(missing_ok=True)
+    assert preview.post("options", {"frames": [0, 2]}) == 200
+    press(page, "Side by side")
+    shows(page, 0, "beside")
+    expect(page.locator("#quality")).to_have_text("draft")
+    wide = page.locator("#over").evaluate("image => [image.naturalWidth, image.naturalHeight]")
+    unfold(page)
+    box = page.get_by_label("Photo, IUV and result side by side")
+    box.check()
+    expect(page.get_by_label("The same as a command")).to_contain_text("--compare")
+    press(page, "Render")
+    expect(page.locator("#renders li").last).to_contain_text("Done in")
+    with av.open(str(preview.folder / "out.webm")) as container:
+        assert [container.streams.video[0].width, container.streams.video[0].height] == wide
+    page.get_by_role("button", name="Background: None").click()
+    expect(box).to_be_disabled()
+    expect(box).not_to_be_checked()
 
 
 def test_photos_are_dropped_looked_at_and_removed(page, preview, tmp_path) -> None:
@@ -621,7 +662,7 @@ def test_a_clip_is_estimated_with_time_left_and_can_be_given_up(tmp_path, open_p
         press(page, "Cancel")
         expect(page.locator("#subject")).to_have_text("astronaut.jpg in the motion of Dance")
         shows(page, 0)
-        press(page, "clip.mp4")
+        press(page, "Motion: clip.mp4")
         expect(page.get_by_role("button", name="Clip", exact=True)).to_be_visible(timeout=120_000)
         shows(page, 0)
         press(page, "Render")
@@ -652,6 +693,31 @@ def test_a_broken_frame_says_so_and_the_others_work(tmp_path, open_page, browser
     # The server is gone: the page has to say so rather than stand still.
     expect(page.get_by_role("alert")).to_contain_text("does not answer")
     page.goto("about:blank")  # else it goes on asking, which the browser notes as errors
+
+
+def test_gaps_are_shown_and_filled(tmp_path, open_page) -> None:
+    """A clip in which the person is away for a while: what its frames show can be chosen."""
+    driver = tmp_path / "frames"
+    driver.mkdir()
+    with av.open(str(DEMO / "driver.mkv")) as container:
+        for index, frame in zip(range(6), container.decode(video=0), strict=False):
+            pixels = frame.to_ndarray(format="rgb24")
+            if index in (3, 4):
+                pixels[...] = 0
+            Image.fromarray(pixels).save(driver / f"{index:03d}_IUV.png")
+    inputs = ("--source", DEMO / "source.png", "--driver", driver, "--renderer", "texture")
+    with previewing(tmp_path, *inputs) as running:
+        page = open_page(running.link)
+        expect(page.locator(".mark.missing")).to_have_attribute("data-range", "3:5")
+        page.get_by_label("Frame", exact=True).fill("4")
+        shows(page, 4)
+        nobody = page.locator("#over").get_attribute("src")
+        page.get_by_label("Where nobody is").select_option("hold")
+        expect(page.get_by_label("The same as a command")).to_contain_text("--missing hold")
+        shows(page, 4)
+        until(lambda: page.locator("#over").get_attribute("src") != nobody)
+        until(lambda: pixel(page, SIDE_PX // 2, SIDE_PX // 2) != [255] * 3)
+        page.close()
 
 
 def test_without_the_token_nothing_is_told(preview) -> None:
@@ -686,7 +752,7 @@ def test_a_phone_shows_all_of_it_without_scrolling_sideways(
 ) -> None:
     phone = {"width": 390, "height": 844}
     page = open_page(preview.link, viewport=phone, color_scheme=scheme)
-    for name in VIEWS[:3]:
+    for name in list(VIEWS)[:4]:
         press(page, name)
         page.wait_for_timeout(100)
         assert page.evaluate("document.documentElement.scrollWidth") <= phone["width"]

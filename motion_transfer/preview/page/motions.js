@@ -30,18 +30,23 @@ function showMotions({ state }, { busy, words }, choose) {
   const signature = JSON.stringify(state.motions);
   if (list.dataset.signature !== signature) { // a focused button stays what it is
     list.dataset.signature = signature;
-    list.replaceChildren(...state.motions.map(({ number, name }) => {
-      const chip = make("button", { type: "button", className: "chip", textContent: name, title: name });
-      chip.dataset.number = number;
-      chip.addEventListener("click", () => choose(number));
-      return chip;
-    }));
+    list.replaceChildren(...state.motions.map((motion) => motionTile(motion, choose)));
   }
-  for (const chip of list.children) {
-    chip.setAttribute("aria-pressed", String(Number(chip.dataset.number) === state.motion));
-    chip.disabled = Boolean(busy);
+  for (const tile of list.querySelectorAll("button")) {
+    tile.setAttribute("aria-pressed", String(Number(tile.dataset.number) === state.motion));
+    tile.disabled = Boolean(busy);
   }
   byId("add-motion").disabled = Boolean(busy);
   words.hidden = !busy;
   setText(words, busy ?? "");
+}
+
+function motionTile({ number, name }, choose) {
+  const image = make("img", { src: `motion/${number}`, alt: "", loading: "lazy" });
+  image.addEventListener("error", () => image.remove(), { once: true }); // BVH has no pictures
+  const tile = make("button", { type: "button", className: "photo", title: name }, image);
+  tile.dataset.number = number;
+  tile.setAttribute("aria-label", `Motion: ${name}`);
+  tile.addEventListener("click", () => choose(number));
+  return make("li", {}, tile, make("span", { className: "photo-name", textContent: name }));
 }

@@ -14,6 +14,12 @@ const WORDS = {
   background: "as the background",
 };
 
+const GAPS = {
+  "": "as usual",
+  hold: "repeat the frame before",
+  background: "show the background",
+};
+
 /** Returns choose(changes), which posts options and shows what the server says to them. */
 export function setUpOptions(looking) {
   const send = async (changes) => {
@@ -31,6 +37,7 @@ export function setUpOptions(looking) {
     byId(option).addEventListener("change", (event) => choose({ [option]: event.target.value }));
   }
   setUpRange(looking, choose);
+  byId("missing").addEventListener("change", ({ target }) => choose({ missing: target.value }));
   byId("frame_rate").addEventListener("change", (event) => {
     choose({ frame_rate: event.target.value.trim() });
   });
@@ -81,6 +88,9 @@ function showRange(looking) {
   for (const id of ["in", "out"]) byId(id).disabled = !count;
   for (const id of ["in-here", "out-here"]) byId(id).disabled = !looking.isReady;
   byId("whole").hidden = !count || (start === 0 && stop === count);
+  const missing = state.options.missing ?? "";
+  byId("missing-field").hidden = !missing && !state.missing.length;
+  fill(byId("missing"), Object.keys(GAPS), missing, { ...GAPS, fail: "stop the render" });
   const length = `${plural(stop - start, "frame")}, ${((stop - start) / rate).toFixed(2)} s`;
   setText(byId("length"), count ? length : "");
 }

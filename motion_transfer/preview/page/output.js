@@ -12,6 +12,7 @@ export function setUpOutput(looking, choose) {
   for (const [option, read] of Object.entries(chosen)) {
     byId(option).addEventListener("change", ({ target }) => choose({ [option]: read(target.value) }));
   }
+  byId("compare").addEventListener("change", ({ target }) => choose({ compare: target.checked }));
   byId("name").addEventListener("input", ({ target }) => (target.dataset.typed = "yes"));
   byId("name").addEventListener("change", ({ target }) => delete target.dataset.typed);
   byId("render").addEventListener("click", () => render(looking));
@@ -54,6 +55,8 @@ function showOutput(looking) {
   fill(byId("format"), output.formats, output.format);
   showQuality(output, options);
   showSound(output, options);
+  byId("compare").checked = options.compare;
+  byId("compare").disabled = options.background === "transparent"; // panels have no alpha
   setText(byId("command"), command ?? "");
   const line = byId("render-words");
   const words = output.fault || (looking.isReady ? `To ${output.folder}` : "");

@@ -192,7 +192,7 @@ export class Stage {
     const name = state.sources[photoIndex]?.name;
     setText(which, `${photoIndex + 1} of ${state.sources.length} · ${name}${leads}`);
     const badge = byId("quality");
-    badge.hidden = layer.name !== "result";
+    badge.hidden = !layer.drafts;
     const kind = draft || this.looking.state.options.renderer === "texture" ? "draft" : "network";
     badge.dataset.kind = kind;
     const wait = draft && !this.looking.playing;

@@ -10,6 +10,7 @@ const photo = (_index, looking) => `source/${looking.state.sources[looking.photo
 // driver's frame, so that a crop window can be drawn on it. `quick`: comes within a moment.
 const PICTURES = {
   result: { path: frame("result"), drafts: true },
+  beside: { path: frame("beside"), drafts: true },
   iuv: { path: frame("iuv"), onFrame: true, quick: true },
   pictures: { path: frame("pictures"), onFrame: true, quick: true },
   features: { path: frame("features") },
@@ -21,6 +22,7 @@ const PICTURES = {
 const VIEWS = [
   ["result", "Result"],
   ["compare", "Compare"],
+  ["beside", "Side by side"],
   ["iuv", "IUV"],
   ["pictures", "Clip"],
   ["source", "Person"],
