@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,7 @@ def describe(session: Session) -> dict[str, Any]:
             **_outputs(session),
             "notices": _notices(session),
             "error": session.error,
-            "folder": str(session.folder),
+            "folder": _short(session.folder),
             "limits": {"file": MOST_FILE_BYTES, "all": MOST_BYTES, "used": session.dropped.bytes},
         }
 
@@ -126,7 +127,7 @@ def _outputs(session: Session) -> dict[str, Any]:
     return {
         "output": {
             "path": str(output),
-            "folder": str(output.absolute().parent),
+            "folder": _short(output.absolute().parent),
             "name": output.stem,
             "format": output.suffix.lower(),
             "formats": [each for each in FORMATS if each != ".png"],
@@ -183,6 +184,13 @@ def _groups(parts: tuple[int, ...]) -> list[str]:
 def _name_some(names: list[str]) -> str:
     """Name one or two, and count more."""
     return ", ".join(names) if len(names) < 3 else f"{names[0]} and {len(names) - 1} more"
+
+
+def _short(folder: Path) -> str:
+    """Write a folder as people write it: from the home folder on, where it lies in there."""
+    with suppress(RuntimeError, ValueError):  # there is no such folder, or it lies elsewhere
+        return str("~" / folder.relative_to(Path.home()))
+    return str(folder)
 
 
 def _whom(count: int, current: str) -> list[str]:
