@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, Protocol
 
 from motion_transfer.drawing.backgrounds import make_background
@@ -19,31 +17,12 @@ from motion_transfer.errors import InputError
 from motion_transfer.evaluation.framing import Framing, Image
 from motion_transfer.evaluation.in_shop import spell_names
 from motion_transfer.evaluation.options import EvaluationOptions
+from motion_transfer.evaluation.result_names import PATTERNS, cut_result, fill_pattern
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES
 from motion_transfer.media.pictures.photo import read_photo
-from motion_transfer.training.pairs import Pair, flat_stem
+from motion_transfer.training.pairs import Pair
 from motion_transfer.training.pictures import PersonPicture
 from motion_transfer.weights import find_weights
-
-PATTERNS = {
-    "SOURCE__TARGET": 1,
-    "SOURCE___TARGET": 1,
-    "SOURCE___TARGET_vis": 5,
-    "SOURCE_2_TARGET": 1,
-    "SOURCE_2_TARGET_vis": 1,
-    "SOURCE.jpg_TARGET.jpg": 3,
-    "SOURCE.jpg___TARGET.jpg": 1,
-    "SOURCE.jpg___TARGET.jpg_vis": 5,
-}
-"""How results are named, without their ending: as this program does, then as the published code of
-Zhu et al. (PATN, `___`), Ren et al. (GFLA, `_2_`) and Siarohin et al. (DSC, `.jpg_`) does. Where a
-name held folders, `-` joins them; `.jpg` keeps the ending of each picture in the pair list.
-DeepFashion's photos may be spelled in all the ways that `spell_names` knows.
-
-And how many pictures stand side by side in a file, the result last: DSC's `test.py` joins source,
-target and result, PATN's visuals are source, pose, target, pose and result. What is no such strip
-is taken whole. The code of Esser et al. (VUnet) names no pairs: its `transfer_0.png` tiles a
-shuffled batch, each person in the poses of all; pictures cut out of it have to be named."""
 
 Draw = Callable[[Pair, PersonPicture], Image]
 """Draws one source in a target's pose, as large as the target or of its aspect."""
@@ -143,19 +122,19 @@ class ResultsFolder:
         }
         pairs = list(pairs)
         found = {
-            pattern: sum(_name_result(pattern, pair) in self._files for pair in pairs)
+            pattern: sum(fill_pattern(pattern, pair) in self._files for pair in pairs)
             for pattern in PATTERNS
         }
         self.pattern = max(found, key=lambda pattern: found[pattern])
         if not found[self.pattern]:
             raise InputError(
                 f"results {path}: none of its {len(self._files)} pictures belongs to a pair; the"
-                f" first should be called {_name_result(self.pattern, pairs[0])}.png"
+                f" first should be called {fill_pattern(self.pattern, pairs[0])}.png"
             )
 
     def find_problem(self, pair: Pair, framing: Framing) -> str | None:
         """Tell what is wrong with a pair's picture, if anything is."""
-        name = _name_result(self.pattern, pair)
+        name = fill_pattern(self.pattern, pair)
         if name not in self._files:
             return f"{self.path}/{name}.png does not exist"
         try:
@@ -168,12 +147,9 @@ class ResultsFolder:
 
     def read(self, pair: Pair, target: PersonPicture) -> Image:
         """Read the picture of a pair, the last one where it is a strip. Raises: InputError."""
-        picture = read_photo(self._files[_name_result(self.pattern, pair)], "result").rgb
-        count = PATTERNS[self.pattern]
-        (height, width), (target_height, target_width) = picture.shape[:2], target.rgb.shape[:2]
-        # half-way, in ratios: a method may crop the target to 176 of 256 px, or pad it from there
-        is_strip = width * target_height > math.sqrt(count) * height * target_width
-        return picture[:, -(width // count) :] if count > 1 and is_strip else picture
+        picture = read_photo(self._files[fill_pattern(self.pattern, pair)], "result").rgb
+        height, width = target.rgb.shape[:2]
+        return cut_result(picture, PATTERNS[self.pattern], width / height)
 
     def describe(self) -> dict[str, Any]:
         return {
@@ -236,13 +212,3 @@ def make_labels_unique(candidates: Sequence[Candidate], origins: Sequence[Path])
     for candidate, own in zip(candidates, resolved, strict=True):
         if labels.count(candidate.label) > 1:
             candidate.label = f"{own.parent.name}/{candidate.label}"
-
-
-def _name_result(pattern: str, pair: Pair) -> str:
-    """Fill a pattern in with a pair's names."""
-    words = {}
-    for word, picture in (("SOURCE", pair.source), ("TARGET", pair.target)):
-        words[word] = flat_stem(picture.name)
-        words[f"{word}.jpg"] = PurePosixPath(picture.name).name
-    # at once, as a source may itself be called TARGET
-    return spell_names(re.sub(r"(SOURCE|TARGET)(\.jpg)?", lambda found: words[found[0]], pattern))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from motion_transfer.errors import InputError
+from motion_transfer.evaluation.result_names import item_name
 from motion_transfer.media.folders import list_files, natural_key
 from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES
 
@@ -15,7 +15,6 @@ IMAGES_FOLDER, EVALUATION_FILE = "images", "results.json"
 """Where `mt eval --save-images` writes a folder for each method, and the file beside it."""
 
 ANIMATED = (".gif", ".apng")  # no video to a browser: they cannot be started together
-PICTURE_ENDINGS = "|".join(re.escape(suffix) for suffix in PHOTO_SUFFIXES)
 MISSING_SHOWN = 3
 
 Say = Callable[[str], None]
@@ -28,19 +27,6 @@ class MethodFolder:
     label: str
     path: Path
     files: dict[str, Path]
-
-
-def item_name(stem: str) -> str:
-    """Turn the names that published code gives one pair into one: `SOURCE__TARGET`.
-
-    Every pattern of `motion_transfer.evaluation.candidates.PATTERNS` becomes the first of them; a
-    name in none of them stays as it is.
-    """
-    bare = stem.removesuffix("_vis")
-    strip = rf"({PICTURE_ENDINGS})_(?!_)(?=.*({PICTURE_ENDINGS})$)"  # as DSC's code joins two names
-    bare = re.sub(strip, "__", bare, flags=re.I)
-    bare = re.sub(rf"({PICTURE_ENDINGS})(?=___|$)", "", bare, flags=re.I)
-    return re.sub("___|_2_", "__", bare)
 
 
 def is_video(path: Path) -> bool:

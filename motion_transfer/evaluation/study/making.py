@@ -14,6 +14,7 @@ from pathlib import Path
 
 from motion_transfer.cores import core_count
 from motion_transfer.errors import InputError
+from motion_transfer.evaluation.result_names import PATTERNS, cut_result, find_pattern
 from motion_transfer.evaluation.study.items import (
     MethodFolder,
     Say,
@@ -150,6 +151,8 @@ def _write_media(
 def _write_blind(path: Path, destination: Path) -> tuple[tuple[int, int], float]:
     """Write a picture or video without anything that tells where it is from.
 
+    Of strips, as published code writes them, the result alone is shown.
+
     Returns: Its size, (width, height) in px, and how long it plays, in seconds.
     Raises: InputError if it cannot be shown.
     """
@@ -158,7 +161,9 @@ def _write_blind(path: Path, destination: Path) -> tuple[tuple[int, int], float]
         return video.size, float(video.duration_seconds)
     if open_pictures(path).frame_count > 1:
         raise InputError(f"{path} is an animation; make a video of it, such as .mp4")
+    pattern = find_pattern(path.stem)
     picture = read_photo(path, "picture").on_white()
+    picture = cut_result(picture, PATTERNS[pattern] if pattern else 1)
     write_png(destination, picture)
     return (picture.shape[1], picture.shape[0]), 0
 

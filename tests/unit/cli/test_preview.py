@@ -20,7 +20,7 @@ def test_what_is_chosen_on_the_page_has_something_in_its_place() -> None:
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (("--source", "a.png"), "--driver is missing; give a source and a driver, or a manifest"),
+        (("--source", "a.png", "--frame", "1"), "--driver is missing; give a source and a driver"),
         (("--source", "a.png", "--driver", "d", "--frame", "1"), "--frame needs -o FILE.png"),
         (("jobs.yaml", "--driver", "d"), "says what its jobs do; leave out --driver"),
         (("jobs.yaml", "--job", "7"), "job 7 asked for, but jobs.yaml has 1, from 0"),

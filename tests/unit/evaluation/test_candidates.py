@@ -11,7 +11,6 @@ import pytest
 
 from motion_transfer.errors import InputError
 from motion_transfer.evaluation.candidates import (
-    PATTERNS,
     OpenedSource,
     RenderedCandidate,
     ResultsFolder,
@@ -19,6 +18,7 @@ from motion_transfer.evaluation.candidates import (
     make_labels_unique,
 )
 from motion_transfer.evaluation.framing import Framing
+from motion_transfer.evaluation.result_names import PATTERNS
 from motion_transfer.training.pairs import PairList, open_pairs
 
 

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from motion_transfer.errors import InputError
-from motion_transfer.evaluation.candidates import PATTERNS
 from motion_transfer.evaluation.study.items import (
     find_sources,
-    item_name,
     open_methods,
     shared_items,
 )
@@ -22,17 +20,6 @@ GREY = np.full((32, 32, 3), 128, np.uint8)
 
 def quiet(_words: str) -> None:
     pass
-
-
-@pytest.mark.parametrize("pattern", PATTERNS)
-def test_published_names_are_one_item(pattern: str) -> None:
-    stem = pattern.replace("SOURCE", "id_01_1front").replace("TARGET", "id_01_2side")
-    assert item_name(stem) == "id_01_1front__id_01_2side"
-
-
-def test_other_names_stay() -> None:
-    assert item_name("astronaut_walk") == "astronaut_walk"
-    assert item_name("v1.5") == "v1.5"
 
 
 def test_methods_are_called_as_their_folders_or_as_told(studio) -> None:
