@@ -480,7 +480,7 @@ def test_a_window_is_drawn_typed_and_given_back(page) -> None:
     for name, value in {"x": 80, "y": 60, "width": 200}.items():
         expect(outline).to_have_attribute(name, re.compile(rf"^({value - 1}|{value}|{value + 1})$"))
     expect(page.locator("#window-words")).to_contain_text("by hand")
-    side = page.get_by_label("Side")
+    side = page.get_by_label("Side", exact=True)
     side.fill("160")
     side.press("Enter")
     expect(outline).to_have_attribute("width", "160")
@@ -491,7 +491,7 @@ def test_a_window_is_drawn_typed_and_given_back(page) -> None:
 
 
 def test_a_window_that_cannot_be_is_given_back_and_not_rendered(page) -> None:
-    side, automatic = page.get_by_label("Side"), page.get_by_role("button", name="Automatic")
+    side, automatic = page.get_by_label("Side", exact=True), page.get_by_role("button", name="Automatic")
     before = side.input_value()
     expect(automatic).to_be_disabled()
     side.fill("3")
