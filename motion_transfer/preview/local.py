@@ -8,6 +8,7 @@ makes by their Origin.
 
 from __future__ import annotations
 
+import logging
 import re
 import secrets
 import socket
@@ -144,7 +145,16 @@ class LocalServer:
 
     def run(self) -> None:
         """Answer until a signal comes, which is raised again when everything is closed."""
-        self._server.run(sockets=[self._socket])
+        log = logging.getLogger("uvicorn.error")
+        log.addFilter(self._is_news)
+        try:
+            self._server.run(sockets=[self._socket])
+        finally:
+            log.removeFilter(self._is_news)
+
+    def _is_news(self, _record: logging.LogRecord) -> bool:
+        """Tell whether a fault is one: at the end all that is still asked for is given up."""
+        return not self._server.should_exit
 
     def stop(self) -> None:
         """End soon; from any thread."""

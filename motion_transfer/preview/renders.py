@@ -71,7 +71,8 @@ class RenderQueue:
         Args:
             folder: Of the manifests; it is made with the first of them.
             estimates: Where the IUV of drivers may lie that are raw pictures.
-            changed: Called, by any thread, whenever there is progress.
+            changed: Called whenever there is progress, by any thread, which may hold the queue's
+                lock: it must not wait for another that somebody holds who asks this queue.
         """
         self._folder, self._estimates, self._changed = folder, estimates, changed
         self._lock = threading.Condition()

@@ -73,6 +73,7 @@ class Session:
         self._weights = options.weights
         self.folder, self.job_file = folder, job_file
         self.revision = 0
+        self._counting = threading.Lock()
         self.lock = threading.RLock()
         """Held by whoever reads several things that have to belong together."""
         self.plans: FramePlans | None = None
@@ -512,7 +513,9 @@ class Session:
         return text
 
     def _touch(self) -> None:
-        with self.lock:
+        # a lock of its own: who calls may hold another, such as the renders', which is asked for
+        # while `lock` is held
+        with self._counting:
             self.revision += 1
 
 

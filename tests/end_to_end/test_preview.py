@@ -491,7 +491,10 @@ def test_a_window_is_drawn_typed_and_given_back(page) -> None:
 
 
 def test_a_window_that_cannot_be_is_given_back_and_not_rendered(page) -> None:
-    side, automatic = page.get_by_label("Side", exact=True), page.get_by_role("button", name="Automatic")
+    side, automatic = (
+        page.get_by_label("Side", exact=True),
+        page.get_by_role("button", name="Automatic"),
+    )
     before = side.input_value()
     expect(automatic).to_be_disabled()
     side.fill("3")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from decoded import decoded
 from PIL import Image
 
 from motion_transfer import render_video
@@ -38,11 +39,6 @@ def photos(studio) -> list[Path]:
     ]
 
 
-def content(path: Path) -> dict[str, bytes]:
-    files = sorted(path.iterdir()) if path.is_dir() else [path]
-    return {file.name: file.read_bytes() for file in files}
-
-
 def first_frame(folder: Path) -> np.ndarray:
     return np.asarray(Image.open(folder / "000000.png")).astype(int)
 
@@ -58,7 +54,7 @@ def test_each_photo_gives_what_it_shows(studio, draft: Callable, photos: list[Pa
         words = [word for photo in given for word in ("--source", photo)]
         outcome = draft(*words, "--driver", driver, "-o", studio.folder / name)
         assert (outcome.code, outcome.err) == (0, "")
-        made.append(content(studio.folder / name))
+        made.append(decoded(studio.folder / name))
     assert made[0] != made[1] and made[0] != made[2]
     both = studio.folder / "both"
     np.testing.assert_allclose(colour_of(studio, both, (9, 10)), GREEN, atol=12)
@@ -73,7 +69,7 @@ def test_the_same_photo_twice_is_like_once(studio, photos: list[Path]) -> None:
 
 
 def test_each_takes_its_own_iuv(studio, draft: Callable, photos: list[Path]) -> None:
-    """Named, or beside it: the same bytes; one for two is refused."""
+    """Named, or beside it: the same pixels; one for two is refused."""
     driver, words = studio.driver(1), [w for photo in photos for w in ("--source", photo)]
     assert draft(*words, "--driver", driver, "-o", studio.folder / "beside").code == 0
     named = []
@@ -82,7 +78,7 @@ def test_each_takes_its_own_iuv(studio, draft: Callable, photos: list[Path]) -> 
         named += ["--source-iuv", iuv.rename(studio.folder / f"of {photo.name}")]
     outcome = draft(*words, *named, "--driver", driver, "-o", studio.folder / "named")
     assert (outcome.code, outcome.err) == (0, "")
-    assert content(studio.folder / "named") == content(studio.folder / "beside")
+    assert decoded(studio.folder / "named") == decoded(studio.folder / "beside")
     outcome = draft(*words, *named[:2], "--driver", driver, "-o", studio.folder / "no")
     assert outcome.code == 2
     assert "1 source IUV for 2 sources; give one for each" in outcome.err
@@ -97,6 +93,11 @@ def test_a_photo_of_other_clothes_is_told(studio, draft: Callable) -> None:
     outcome = draft(*words, "-o", studio.folder / "out")
     assert outcome.code == 0
     assert f"{other} seems to show somebody else than {photo}, or other clothes" in outcome.err
+
+
+def content(path: Path) -> dict[str, bytes]:
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    return {file.name: file.read_bytes() for file in files}
 
 
 @pytest.mark.parametrize("name", ["out.mp4", "out"])
@@ -198,7 +199,7 @@ def test_a_folder_and_a_video_are_like_their_pictures(
     outcome = draft("--source", source, "--driver", driver, "-o", studio.folder / "out")
     assert (outcome.code, outcome.err) == (0, "")
     draw(photos, driver, studio.folder / "photos")
-    assert content(studio.folder / "out") == content(studio.folder / "photos")
+    assert decoded(studio.folder / "out") == decoded(studio.folder / "photos")
 
 
 def test_a_photo_of_a_folder_that_changes_is_drawn_anew(studio) -> None:
@@ -266,7 +267,7 @@ def test_a_batch_takes_lists(
     )
     outcome = mt("batch", "run", manifest, "--workers", 1)
     assert outcome.code == 0, outcome.err
-    both = content(draw(photos, driver, studio.folder / "both").output)
-    alone = content(draw(photos[0], driver, studio.folder / "alone").output)
-    found = {name: content(studio.folder / name) for name in ("listed", "folder", "m3", "m4")}
+    both = decoded(draw(photos, driver, studio.folder / "both").output)
+    alone = decoded(draw(photos[0], driver, studio.folder / "alone").output)
+    found = {name: decoded(studio.folder / name) for name in ("listed", "folder", "m3", "m4")}
     assert found == {"listed": both, "folder": both, "m3": alone, "m4": both}

@@ -296,6 +296,6 @@ def test_uses_that_mean_nothing(mt, study: Path) -> None:
         ((study,), "Missing option '-o'"),
     ):
         result = mt("eval", "study", *words)
-        assert (result.code, told in result.err) == (2, True), result.err
+        assert (result.code, told.lower() in result.err.lower()) == (2, True), result.err
     result = mt("eval", "-q", "study", study)
     assert "mean nothing to `mt eval study`" in result.err

@@ -330,6 +330,16 @@ def test_rendering_makes_what_the_run_makes(options: RenderOptions, open_session
     assert len(session.renders.all) == 1, "the one that it replaces is forgotten"
 
 
+def test_a_render_can_report_while_the_state_is_described(options, open_session) -> None:
+    """Who describes holds the session and asks the renders; they must not wait for the session."""
+    session = open_session(options)
+    session.wait_for_plan()
+    with session.lock:
+        number = session.renders.add(replace(session.options, frames=(0, 2))).number
+        wait_for(lambda: session.renders.get(number).status == "done")
+    assert describe(session)["renders"][0]["status"] == "done"
+
+
 def test_nobody_is_drawn_until_somebody_is_chosen(options: RenderOptions, open_session) -> None:
     session = open_session(options, is_empty=True, names_output=False)
     session.wait_for_plan()

@@ -68,7 +68,7 @@ def test_a_folder_holds_the_same_weights(checkpoint: Path, folder: Path, tmp_pat
 
 
 def test_the_command_line_takes_it(studio, mt, checkpoint: Path, folder: Path) -> None:
-    words = ("--source", studio.source(), "--driver", studio.driver(2))
+    words = ("--source", studio.source(), "--driver", studio.driver(2), "--provenance", "mark")
     for name, weights in (("one.png", checkpoint), ("other.png", folder)):
         out = studio.folder / name
         result = mt("run", *words, "--frames", "0", "--weights", weights, "-o", out)
