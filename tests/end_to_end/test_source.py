@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from decoded import decoded
 from PIL import Image
 
 from motion_transfer.api import render_video
