@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
@@ -215,6 +215,16 @@ def mt(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
 def draft(mt: Callable[..., Outcome]) -> Callable[..., Outcome]:
     """`mt run` with the texture renderer: exact colours, and no network to load."""
     return lambda *arguments: mt("run", "--renderer", "texture", *arguments)
+
+
+@pytest.fixture
+def few_frames(monkeypatch: pytest.MonkeyPatch) -> int:
+    """The demos, which have no option for it, draw so many of their frames."""
+    from motion_transfer.render import run
+
+    whole, count = run.run, 6
+    monkeypatch.setattr(run, "run", lambda o, *more: whole(replace(o, frames=(0, count)), *more))
+    return count
 
 
 @pytest.fixture(scope="session")
