@@ -53,7 +53,8 @@ def install_command(extra: str) -> str:
 def require_extra(extra: str) -> None:
     """Raise InputError, with the command that installs it, unless an extra is there."""
     if missing := missing_packages(extra):
+        which = "which is" if len(missing) == 1 else "which are"
         raise InputError(
-            f"{EXTRAS[extra].need} {' and '.join(missing)}, which is not installed;"
+            f"{EXTRAS[extra].need} {' and '.join(missing)}, {which} not installed;"
             f" {install_command(extra)}"
         )
