@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -215,6 +216,21 @@ def mt(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
 def draft(mt: Callable[..., Outcome]) -> Callable[..., Outcome]:
     """`mt run` with the texture renderer: exact colours, and no network to load."""
     return lambda *arguments: mt("run", "--renderer", "texture", *arguments)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A browser without a window; skipped, with the reason, where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    program = next(filter(None, map(shutil.which, names)), None)
+    if program is None:
+        pytest.skip("needs a chromium")
+    with playwright.sync_playwright() as player:
+        arguments = ["--headless", "--no-sandbox", "--disable-gpu"]
+        browser = player.chromium.launch(executable_path=program, args=arguments)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture

@@ -29,11 +29,6 @@ playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright
 expect = playwright.expect
 expect.set_options(timeout=90_000)  # ms; the network draws a frame in 1 s on two idle cores
 
-CHROMIUM = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs a chromium")
-
 DEMO = Path(str(files("motion_transfer.demo")))
 FRAMES, SIDE_PX = 120, 320  # of the demo's driver
 START_SECONDS = 60
@@ -143,16 +138,6 @@ def preview(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Preview]:
     inputs = ("--source", source, "--driver", driver, "-o", "out.webm")
     with previewing(folder, *inputs, "--renderer", "texture") as running:
         yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as player:
-        browser = player.chromium.launch(
-            executable_path=CHROMIUM, args=["--headless", "--no-sandbox", "--disable-gpu"]
-        )
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

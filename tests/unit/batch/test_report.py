@@ -11,8 +11,6 @@ import pytest
 from motion_transfer.batch.report import _duration, write_report
 from motion_transfer.batch.run import read_batch
 
-CHROMIUM = Path("/usr/bin/chromium")
-
 
 @pytest.fixture
 def report(tmp_path: Path) -> Path:
@@ -73,20 +71,14 @@ def test_durations_are_words() -> None:
     ]
 
 
-@pytest.mark.skipif(not CHROMIUM.exists(), reason="needs Chromium")
-def test_it_fits_a_phone_and_filters(report: Path) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as driver:
-        arguments = ["--headless", "--no-sandbox", "--disable-gpu"]
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        page = browser.new_page(viewport={"width": 390, "height": 800})
-        page.goto(report.as_uri())
-        assert page.evaluate("document.documentElement.scrollWidth") == 390
-        counted = page.locator("#filter output")
-        page.fill("input[type=search]", "NEVER no")
-        assert counted.inner_text() == "1 of 3"
-        assert page.locator("article:visible h2").all_inner_texts() == ["bad.mp4"]
-        page.fill("input[type=search]", "")
-        page.select_option("select", "done")
-        assert counted.inner_text() == "2 of 3"
-        browser.close()
+def test_it_fits_a_phone_and_filters(report: Path, browser) -> None:
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto(report.as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    counted = page.locator("#filter output")
+    page.fill("input[type=search]", "NEVER no")
+    assert counted.inner_text() == "1 of 3"
+    assert page.locator("article:visible h2").all_inner_texts() == ["bad.mp4"]
+    page.fill("input[type=search]", "")
+    page.select_option("select", "done")
+    assert counted.inner_text() == "2 of 3"
