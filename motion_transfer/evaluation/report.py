@@ -294,6 +294,24 @@ def compare(paths: Sequence[Path]) -> str:
     return table(tuple(columns.values()), methods, read[0].protocol.pairs_count)
 
 
+def summary(results: Results) -> str:
+    """Write what an evaluation found: its table, and that of published numbers."""
+    protocol = results.protocol
+    count = protocol.pairs_count
+    lines = [
+        table(results.columns, results.methods, count),
+        f"{count} pairs of {protocol.pairs_name} at {protocol.resolution};"
+        " mean ± standard error, * best",
+    ]
+    if results.published is not None:
+        beside = table_beside(results.published, results.columns, results.methods, count)
+        choices = (
+            "what the paper leaves open, and what holds here: protocol.choices in results.json"
+        )
+        lines += ["", beside, results.published.remark, choices]
+    return "\n".join(lines)
+
+
 def table(columns: Sequence[Column], methods: Sequence[Method], pairs_count: int) -> str:
     """Draw numbers as rows, methods as columns: mean ± standard error, the best of a row marked.
 
