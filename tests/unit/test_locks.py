@@ -16,7 +16,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 
 @pytest.mark.parametrize("lock", ["requirements.lock", "requirements-dev.lock"])
 def test_every_pin_runs_on_the_oldest_python(lock: str) -> None:
-    """Some distributions of Linux stay at an early patch of a Python, such as Debian 12 at 3.11.2."""
+    """Distributions of Linux stay at an early patch of a Python, such as Debian 12 at 3.11.2."""
     oldest = PROJECT["requires-python"].removeprefix(">=") + ".0"
     pins = re.findall(r"^([\w.-]+)==(\S+)", (ROOT / lock).read_text(encoding="utf-8"), re.M)
     assert len(pins) > 30
