@@ -298,7 +298,13 @@ def _remember(context: click.Context, *, debug: bool) -> None:
 
 def entry_point() -> None:
     """Run the installed `mt` script."""
-    sys.exit(main())
+    code = main()
+    try:
+        sys.stdout.flush()
+    except OSError:
+        # `main` has told of it; some Pythons try once more at their end, and exit by 120 then
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(code)
 
 
 def _terminate(_signal: int, _frame: FrameType | None) -> None:

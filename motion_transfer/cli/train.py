@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields
 from pathlib import Path
 from types import FrameType
@@ -211,6 +212,9 @@ class Progress:
             self._bar.update(event.step - self._bar.n)
 
 
+STOPPING = b"mt: stopping after this step; once more to stop at once\n"
+
+
 class Stop:
     """Which signal asked to stop, if one did."""
 
@@ -237,7 +241,9 @@ def stop_on_signals() -> Iterator[Stop]:
         if stop.number is not None and callable(before[number]):
             before[number](number, frame)
         stop.number = number
-        click.echo("mt: stopping after this step; once more to stop at once", err=True)
+        # not by `sys.stderr`, in the midst of whose own write the signal may have come
+        with suppress(OSError, ValueError):
+            os.write(sys.stderr.fileno(), STOPPING)
 
     for number in (signal.SIGINT, signal.SIGTERM):
         before[number] = signal.signal(number, handle)

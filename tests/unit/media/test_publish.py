@@ -98,7 +98,7 @@ def test_a_file_is_no_folder(tmp_path: Path) -> None:
 def test_a_read_only_folder_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "locked"
     folder.mkdir(mode=0o500)
-    with pytest.raises(OutputError, match="no permission to write"):
+    with pytest.raises(OutputError, match=r"locked takes no new files \(Permission denied\)"):
         check_destination(folder / "out.mp4", force=False)
 
 
