@@ -129,7 +129,7 @@ def main() -> None:
 
 def compare_photos(options: argparse.Namespace) -> None:
     """Print how near each photo's IUV comes to DensePose's."""
-    estimator = BlazePoseEstimator(weights=options.weights, most_people=1)
+    estimator = BlazePoseEstimator(weights=options.weights, most_people=1, for_photos=True)
     names = list(IuvScore.__dataclass_fields__)
     print(f"{'':16}" + "".join(f"{name:>16}" for name in names))
     scores = []

@@ -7,7 +7,7 @@ frame; `PersonEstimate.on_frame` puts them back.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -37,6 +37,13 @@ LANDMARK_NAMES = (
 LANDMARK_COUNT = len(LANDMARK_NAMES)
 LANDMARK = {name: index for index, name in enumerate(LANDMARK_NAMES)}
 
+
+def other_side(name: str) -> str:
+    """Name the mirror image of a landmark; of the nose it is the nose."""
+    swap = {"left": "right", "right": "left"}
+    return "-".join(swap.get(word, word) for word in name.split("-"))
+
+
 Bone = tuple[tuple[str, ...], tuple[str, ...]]
 """A line from the middle of some landmarks to the middle of others."""
 
@@ -62,6 +69,16 @@ class Landmarks:
     world: Float32[np.ndarray, "33 3"]
     visibility: Float32[np.ndarray, " 33"]
     presence: Float32[np.ndarray, " 33"]
+
+
+def mean_landmarks(found: Sequence[Landmarks]) -> Landmarks:
+    """Take the mean of what several looks at one person found."""
+    return Landmarks(
+        image=np.stack([each.image for each in found]).mean(0),
+        world=np.stack([each.world for each in found]).mean(0),
+        visibility=np.stack([each.visibility for each in found]).mean(0),
+        presence=np.stack([each.presence for each in found]).mean(0),
+    )
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ class EstimatorEntry:
 ESTIMATORS = {
     "blazepose": EstimatorEntry(
         ("motion_transfer.estimate.blazepose", "BlazePoseEstimator"),
-        takes=("frame_rate", "fit"),
+        takes=("frame_rate", "fit", "for_photos"),
     ),
     "densepose": EstimatorEntry(
         ("motion_transfer.estimate.densepose", "DensePoseEstimator"),
@@ -91,6 +91,7 @@ def open_estimator(
     *,
     frame_rate: Fraction | None = None,
     fit: BodyFit | None = None,
+    for_photos: bool = False,
 ) -> Estimator:
     """Open an estimator, ready for a clip.
 
@@ -98,12 +99,14 @@ def open_estimator(
         model: The user's file, for an estimator that runs one.
         frame_rate: The clip's, for smoothing; None means 30.
         fit: Other proportions for everybody.
+        for_photos: Whether it gets photos that have nothing to do with each other, and as much time
+            for each as makes it better.
     Raises: InputError as `check_estimator`; InputError and WeightsError where a model or a package
         is missing, saying how to get it.
     """
     check_estimator(name, model, fit=fit is not None)
     rate = float(frame_rate or DEFAULT_RATE)
-    given = {"model": model, "frame_rate": rate, "fit": fit}
+    given = {"model": model, "frame_rate": rate, "fit": fit, "for_photos": for_photos}
     module, estimator = ESTIMATORS[name].home
     takes = {what: given[what] for what in ESTIMATORS[name].takes}
     return getattr(import_module(module), estimator)(**takes)

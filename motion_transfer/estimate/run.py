@@ -92,7 +92,10 @@ def estimate_iuv(
     # before the estimator, which takes seconds to load
     check_iuv_output(options.output, settings)
     estimator = estimator or open_estimator(
-        options.estimator, options.model, frame_rate=pictures.frame_rate
+        options.estimator,
+        options.model,
+        frame_rate=pictures.frame_rate,
+        for_photos=pictures.frame_count == 1,
     )
     summary = ClipSummary()
     frames = estimate_clip(

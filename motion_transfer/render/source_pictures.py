@@ -131,7 +131,7 @@ def estimate_person(
         names = " nor ".join(path.name for path in list_iuv_names(photo.path))
         lacking = f"no IUV found for {photo.path} (neither {names} is beside it)"
     try:
-        estimator = open_estimator(options.estimator, options.estimator_model)
+        estimator = open_estimator(options.estimator, options.estimator_model, for_photos=True)
     except InputError as error:
         raise InputError(f"{lacking}, and to estimate it: {error}") from error
     people = estimator.estimate(photo.on_white())

@@ -39,7 +39,7 @@ def save(path: Path, *people: list) -> Path:
 def estimator(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever opens an estimator gets one that sees red above blue."""
 
-    def opened(name: str, model: Path | None, *, frame_rate=None, fit: BodyFit | None = None):
+    def opened(name: str, model: Path | None, *, fit: BodyFit | None = None, **_how: object):
         return StandingEstimator(fit)
 
     for module in (source_pictures, picture_driver):

@@ -56,6 +56,8 @@ class BlazePoseEstimator:
             each other call `start_shot` before each, or turn it off.
         frame_rate: Frames per second, for smoothing.
         fit: Gives everybody other proportions, before their IUV is painted.
+        for_photos: Whether every frame is a photo of its own, and worth several looks at everybody
+            (`BodyTracker.look_again`), of which the means count.
     Raises: InputError where the models are missing; WeightsError.
     """
 
@@ -67,6 +69,7 @@ class BlazePoseEstimator:
         smooth: bool = True,
         frame_rate: float = 30.0,
         fit: BodyFit | None = None,
+        for_photos: bool = False,
     ) -> None:
         with ThreadPoolExecutor() as threads:  # each takes a quarter of a second
             painter = partial(_open_painter, weights) if weights else _open_shipped
@@ -75,8 +78,9 @@ class BlazePoseEstimator:
             threads.submit(LandmarkModel, find_model(LANDMARKER)).result()
             detector.result()  # the tracker finds them open
         self._network = network.result()
+        smooth = smooth and not for_photos
         self._tracker = BodyTracker(most_people=most_people, smooth=smooth, frame_rate=frame_rate)
-        self._fit = fit
+        self._fit, self._for_photos = fit, for_photos
         self._seconds = 1 / frame_rate if smooth else None
         self._details: DetailsInFrame | None = None
 
@@ -98,24 +102,39 @@ class BlazePoseEstimator:
         Raises: InputError if the frame is no RGB picture.
         """
         check_frame(frame)
-        seen = self._tracker.follow(np.ascontiguousarray(frame))
+        frame = np.ascontiguousarray(frame)
+        if self._for_photos:
+            self.start_shot()
+        looks = [(number, [body]) for number, body in self._tracker.follow(frame)]
+        if self._for_photos:
+            looks = [(number, self._tracker.look_again(frame, body)) for number, (body,) in looks]
+        seen = [(number, bodies[0]) for number, bodies in looks]
         self._details = DetailsInFrame(frame, seen, self._details, self._seconds)
-        return partial(self._finish, seen, self._details, *frame.shape[:2])
+        return partial(self._finish, looks, self._details, *frame.shape[:2])
 
     def _finish(
-        self, seen: list[tuple[int, SeenBody]], details: DetailsInFrame, height: int, width: int
+        self,
+        looks: list[tuple[int, list[SeenBody]]],
+        details: DetailsInFrame,
+        height: int,
+        width: int,
     ) -> list[PersonEstimate]:
         # also where nobody is seen: each frame waits for the one before
         found = details.work_out()
-        people = (self._paint(number, body, found[number], height, width) for number, body in seen)
+        people = (
+            self._paint(number, bodies, found[number], height, width) for number, bodies in looks
+        )
         return [person for person in people if person is not None]
 
     def _paint(
-        self, number: int, body: SeenBody, details: Details, height: int, width: int
+        self, number: int, looks: list[SeenBody], details: Details, height: int, width: int
     ) -> PersonEstimate | None:
+        """Paint one person, whom every look sees in the same pose."""
         if self._fit is not None:
-            seen, body = body, fit_body(body, self._fit)
-            details = fit_details(details, seen.landmarks, body.landmarks, self._fit)
+            fitted = [fit_body(body, self._fit) for body in looks]
+            seen, now = looks[0].landmarks, fitted[0].landmarks
+            details, looks = fit_details(details, seen, now, self._fit), fitted
+        body = looks[0]
         box = _box_on_frame(body, height, width, FAINT)
         if box is None:
             return None
@@ -127,11 +146,7 @@ class BlazePoseEstimator:
         for points in hands.values():
             box = hand_room(points, box, height, width)
         window = body_window(body.landmarks, _box_on_frame(body, height, width, SOLID))
-        # the network shrinks the mask to its own size: no need to see it much finer
-        mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
-        features = body.features.look(_into(window)) if body.features else None
-        (painted,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
-        iuv = paint_iuv(*read_painted(painted), window, box)
+        iuv = paint_iuv(*read_painted(self._run_network(looks, window)), window, box)
         if face is not None:
             lay_head(iuv, box, face)
         for side, points in hands.items():
@@ -140,10 +155,24 @@ class BlazePoseEstimator:
             track=number,
             box=box,
             iuv=iuv,
-            alpha=body.region.paste(np.rint(body.mask * 255).astype(np.uint8), box),
+            alpha=_mean_alpha(looks, box),
             confidence=body.presence,
             landmarks=body.landmarks,
         )
+
+    def _run_network(self, looks: list[SeenBody], window: Box) -> Float32[np.ndarray, "1 73 n n"]:
+        painted = None
+        for body in looks:
+            # it shrinks the mask to its own size: no need to see it much finer
+            mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
+            features = body.features.look(_into(window)) if body.features else None
+            (each,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
+            if len(looks) == 1:
+                return each
+            # a copy: the network's next answer overwrites this one
+            painted = each.copy() if painted is None else np.add(painted, each, out=painted)
+        assert painted is not None
+        return np.divide(painted, len(looks), out=painted)
 
 
 @cache
@@ -178,6 +207,11 @@ def _box_on_frame(body: SeenBody, height: int, width: int, level: float) -> Box 
     if (high <= low).any():
         return None
     return Box(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+
+
+def _mean_alpha(looks: list[SeenBody], box: Box) -> UInt8[np.ndarray, "h w"]:
+    seen = [body.region.paste(np.rint(body.mask * 255).astype(np.uint8), box) for body in looks]
+    return seen[0] if len(seen) == 1 else np.rint(np.mean(seen, 0)).astype(np.uint8)
 
 
 def _into(window: Box) -> Float64[np.ndarray, "2 3"]:

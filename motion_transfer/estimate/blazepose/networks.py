@@ -20,7 +20,13 @@ from jaxtyping import Float32, Float64, UInt8
 
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.inference import open_network
-from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
+from motion_transfer.estimate.interface import (
+    LANDMARK,
+    LANDMARK_COUNT,
+    LANDMARK_NAMES,
+    Landmarks,
+    other_side,
+)
 
 DETECTOR_SIZE = 224
 STRIDES = (8, 16, 32, 32, 32)
@@ -35,6 +41,10 @@ FEATURE_TENSORS = tuple(
 )
 """Enlarged maps of the landmark model: with the finer maps that are added to them they are all that
 its heat maps, and its mask, are read from."""
+
+LAST_PIXEL = 1 - 1 / LANDMARKS_SIZE  # where it lies in a region, see `Region.matrix`
+OTHER_SIDE = [LANDMARK[other_side(name)] for name in LANDMARK_NAMES]
+"""For each landmark the place of its mirror image in the list."""
 
 LEAST_PRESENCE = 0.5  # a smaller chance that a body is there means that there is none
 REFINED_RADIUS = 3  # cells: a landmark is refined by its heat map's 7 x 7 cells around it,
@@ -187,7 +197,8 @@ class SeenBody:
         region: Where it looked.
         mask: The person's share of each pixel of the region, 0..1.
         next_region: Where to look in the next frame.
-        features: None where the body was given other proportions than the picture's.
+        features: None where the body was given other proportions than the picture's, or a mirror
+            was looked at.
     """
 
     presence: float
@@ -204,8 +215,13 @@ class LandmarkModel:
     def __init__(self, model: Path) -> None:
         self._network = open_network(model, FEATURE_TENSORS)
 
-    def locate(self, frame: UInt8[np.ndarray, "H W 3"], region: Region) -> SeenBody | None:
+    def locate(
+        self, frame: UInt8[np.ndarray, "H W 3"], region: Region, *, mirrored: bool = False
+    ) -> SeenBody | None:
         """Find the body in a region of the frame; None where there is none.
+
+        Args:
+            mirrored: Whether to look in a mirror; there are no features then.
 
         Of the network's 39 points 33 are landmarks and two span the region of the next frame; the
         others serve the network's training.
@@ -213,17 +229,24 @@ class LandmarkModel:
         if not region.is_usable:
             return None
         seen = region.cut(frame, LANDMARKS_SIZE, border=cv2.BORDER_REPLICATE)
+        if mirrored:
+            seen = seen[:, ::-1]
         outputs = self._network.run(seen[None].astype(np.float32) / 255)
         points, presence, mask, heat, world, *maps = (output[0] for output in outputs)
         if (chance := float(presence[0])) < LEAST_PRESENCE:
             return None
         rows = points.reshape(-1, 5)  # x, y, depth, and two chances
-        on_frame = region.to_frame(refine(rows[:, :2] / LANDMARKS_SIZE, heat))
+        places = refine(rows[:, :2] / LANDMARKS_SIZE, heat)
+        if mirrored:
+            places[:, 0] = LAST_PIXEL - places[:, 0]
+        on_frame = region.to_frame(places)
         depth = rows[:, 2:3] / LANDMARKS_SIZE * region.side
         chances = _sigmoid(rows[:, 3:])
         metres = world.reshape(-1, 3).copy()
+        if mirrored:
+            metres[:, 0] *= -1
         metres[:, :2] = region.rotate(metres[:, :2])
-        kept = slice(LANDMARK_COUNT)
+        kept = OTHER_SIDE if mirrored else slice(LANDMARK_COUNT)
         landmarks = Landmarks(
             image=np.concatenate([on_frame, depth], 1)[kept].astype(np.float32),
             world=metres[kept],
@@ -231,10 +254,13 @@ class LandmarkModel:
             presence=chances[kept, 1],
         )
         next_region = Region.around_body(*on_frame[LANDMARK_COUNT : LANDMARK_COUNT + 2])
+        mask = _sigmoid(mask[..., 0])
+        if mirrored:
+            return SeenBody(chance, landmarks, region, mask[:, ::-1], next_region, None)
         # copies: the network's next answer overwrites this one
         coarse, fine = (each.transpose(1, 2, 0).copy() for each in maps)
         features = BodyFeatures(coarse, fine, region)
-        return SeenBody(chance, landmarks, region, _sigmoid(mask[..., 0]), next_region, features)
+        return SeenBody(chance, landmarks, region, mask, next_region, features)
 
 
 def refine(

@@ -7,7 +7,7 @@ coordinates are pixels with centres at +0.5.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, remainder, sin
+from math import atan2, cos, hypot, pi, radians, remainder, sin
 
 import cv2
 import numpy as np
@@ -59,6 +59,10 @@ class Region:
     def is_usable(self) -> bool:
         """Whether it is a square of a size that can be looked at."""
         return bool(np.isfinite([self.x, self.y, self.side, self.turn]).all() and self.side >= 2)
+
+    def changed(self, degrees: float, scale: float) -> Region:
+        """Turn it clockwise and make it so many times as large, about its middle."""
+        return Region(self.x, self.y, self.side * scale, self.turn + radians(degrees))
 
     def has_middle_in(self, frame: np.ndarray) -> bool:
         """Tell whether its middle lies on a frame."""

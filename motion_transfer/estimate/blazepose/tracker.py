@@ -15,6 +15,7 @@ from jaxtyping import UInt8
 
 from motion_transfer.estimate.blazepose.networks import LandmarkModel, PersonDetector, SeenBody
 from motion_transfer.estimate.blazepose.region import Region
+from motion_transfer.estimate.interface import mean_landmarks
 from motion_transfer.estimate.models import DETECTOR, LANDMARKER, find_model
 
 NEWCOMERS_EVERY = 12  # frames between two searches while everybody is in sight
@@ -31,6 +32,13 @@ SECOND_LOOKS = 2
 """At a newcomer, each where the last one's landmarks are: nearer than where the detector points.
 Measured: the right part on 0.864 instead of 0.862 of synthetic people's pixels, on 0.870 instead
 of 0.865 of real photos'."""
+
+OTHER_LOOKS = ((7.0, 1.0), (-7.0, 1.0))
+"""At somebody in a photo: by how many degrees a region is turned, and how many times as large.
+
+Measured, with a mirror for each: of 78 photos of held-out people the right part on 0.887 instead of
+0.865 of the pixels, the other side's on 0.012 instead of 0.019, U and V off by 0.030 instead of
+0.034; on real photos 0.880 instead of 0.877. Two more, nearer and farther, gain nothing."""
 
 TILE_OVERLAP = 0.5
 MOST_TILES = 8  # in a row or a column
@@ -97,6 +105,23 @@ class BodyTracker:
         if self._smooth:
             seen = [(track, track.smooth(body, self._seconds)) for track, body in seen]
         return [(track.number, body) for track, body in seen]
+
+    def look_again(self, frame: UInt8[np.ndarray, "H W 3"], body: SeenBody) -> list[SeenBody]:
+        """Look at somebody through other regions, see `OTHER_LOOKS`, and in a mirror.
+
+        Returns: What was seen first and through the others, all with the mean of all landmarks; a
+            mirror's features are none that the networks know.
+        """
+        regions = [body.region.changed(*each) for each in OTHER_LOOKS]
+        others = [self._landmarker.locate(frame, region) for region in regions]
+        mirrors = [
+            self._landmarker.locate(frame, region, mirrored=True)
+            for region in (body.region, *regions)
+        ]
+        seen = [body, *(other for other in others if other is not None)]
+        found = [*seen, *(mirror for mirror in mirrors if mirror is not None)]
+        mean = mean_landmarks([each.landmarks for each in found])
+        return [replace(each, landmarks=mean) for each in seen]
 
     def _locate(
         self, frame: np.ndarray, track: _Track, seen: list[tuple[_Track, SeenBody]]

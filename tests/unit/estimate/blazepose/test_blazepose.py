@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -25,9 +26,11 @@ from motion_transfer.estimate.blazepose.networks import (
 from motion_transfer.estimate.blazepose.retarget import BONES, BodyFit
 from motion_transfer.estimate.blazepose.tracker import STEADY, BodyTracker
 from motion_transfer.estimate.clip import estimate_clip, lay_iuv
-from motion_transfer.estimate.interface import LANDMARK, LANDMARK_NAMES
+from motion_transfer.estimate.interface import LANDMARK, LANDMARK_NAMES, other_side
 from motion_transfer.estimate.iuv.network import IuvNetwork, save_weights
 from motion_transfer.estimate.iuv.weights import IuvNetworkConfig
+from motion_transfer.people import PeopleStream
+from motion_transfer.training.iuv.trainer import score_iuv
 
 MEDIAN_AWAY, MOST_AWAY = 0.006, 0.05
 """Of the person's height; the farthest are single landmarks whose heat map is at the limit at which
@@ -156,6 +159,45 @@ def test_a_person_and_everything_about_her(estimator) -> None:
     assert x["left-shoulder"] > x["right-shoulder"] + 100  # she faces us
     assert person.landmarks.visibility[LANDMARK["left-knee"]] < 0.5  # only shown to the waist
     assert iuv.shape == photo.shape
+
+
+def test_a_mirror_shows_the_other_side(models) -> None:
+    """In a mirror image that is looked at in a mirror, everything is as it was."""
+    photo = data.astronaut()
+    model = LandmarkModel(models["pose_landmark_full.tflite"])
+    (found, *_) = PersonDetector(models["pose_detection.tflite"]).detect(photo)
+    there = found.region.changed(5, 1)
+    mirrored = replace(there, x=photo.shape[1] - there.x, turn=-there.turn)
+    plain = model.locate(photo, there)
+    seen = model.locate(np.ascontiguousarray(photo[:, ::-1]), mirrored, mirrored=True)
+    other = [LANDMARK[other_side(name)] for name in LANDMARK_NAMES]
+    image, world = plain.landmarks.image[other], plain.landmarks.world[other]
+    pixel = there.side / 256
+    away = seen.landmarks.image - image * (-1, 1, 1) - (photo.shape[1], 0, 0)
+    face = slice(0, LANDMARK["left-shoulder"])  # sharp, and all of it in the picture
+    assert np.abs(away[face, :2]).max() < pixel
+    assert np.abs(away[face, 0].mean()) < pixel / 4  # mirrored about the very middle
+    assert np.abs(seen.landmarks.world - world * (-1, 1, 1))[face].max() < 0.05  # of 0.1 and more
+    visibility = plain.landmarks.visibility[other]
+    assert seen.landmarks.visibility[face] == pytest.approx(visibility[face], abs=0.05)
+    assert np.abs(seen.mask - plain.mask[:, ::-1]).mean() < 0.01
+    assert seen.features is None
+
+
+def test_a_photo_is_looked_at_several_times(models, body_model) -> None:
+    """One look gets this pose wrong; and what was looked at before does not count."""
+    people = PeopleStream(split="held-out", size=(384, 384))
+    photo = people.take(people.dress(8), people.shot(8, 0))
+    scores = []
+    for estimator in (BlazePoseEstimator(), BlazePoseEstimator(for_photos=True)):
+        found = estimate(estimator, photo.rgb)
+        scores.append(score_iuv(lay_iuv(found, *photo.rgb.shape[:2]), photo.iuv))
+    assert scores[1].part_agreement > scores[0].part_agreement + 0.1
+    assert scores[1].uv_error < scores[0].uv_error
+    estimator.estimate(data.astronaut())
+    (again,) = estimator.estimate(photo.rgb)
+    np.testing.assert_array_equal(again.iuv, found[0].iuv)
+    np.testing.assert_array_equal(again.alpha, found[0].alpha)
 
 
 @pytest.mark.parametrize("name", ["cat", "chelsea", "coffee", "rocket", "hubble_deep_field"])
