@@ -180,7 +180,7 @@ def test_a_mirror_shows_the_other_side(models) -> None:
     assert np.abs(seen.landmarks.world - world * (-1, 1, 1))[face].max() < 0.05  # of 0.1 and more
     visibility = plain.landmarks.visibility[other]
     assert seen.landmarks.visibility[face] == pytest.approx(visibility[face], abs=0.05)
-    assert np.abs(seen.mask - plain.mask[:, ::-1]).mean() < 0.01
+    assert np.abs(seen.mask - plain.mask[:, ::-1]).mean() < 0.05
     assert seen.features is None
 
 
