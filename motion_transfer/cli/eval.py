@@ -107,7 +107,7 @@ def _evaluate(words: dict[str, Any], *, quiet: bool, as_json: bool) -> None:
         raise click.UsageError("Missing option '-o' / '--output'.")
     options = options_from_words(EvaluationOptions, words)
     from motion_transfer.evaluation.evaluate import evaluate
-    from motion_transfer.evaluation.report import summary
+    from motion_transfer.evaluation.report import describe_results
 
     if options.protocol in (PEOPLE, FREE_PEOPLE):
         prepare_body_model(quiet, options.protocol_assets)
@@ -124,7 +124,7 @@ def _evaluate(words: dict[str, Any], *, quiet: bool, as_json: bool) -> None:
     if as_json:
         click.echo((options.output / "results.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:
-        click.echo(summary(results))
+        click.echo(describe_results(results))
         click.echo(f"wrote {options.output}: results.json, scores.csv, sheet.png")
 
 

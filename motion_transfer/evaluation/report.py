@@ -294,7 +294,7 @@ def compare(paths: Sequence[Path]) -> str:
     return table(tuple(columns.values()), methods, read[0].protocol.pairs_count)
 
 
-def summary(results: Results) -> str:
+def describe_results(results: Results) -> str:
     """Write what an evaluation found: its table, and that of published numbers."""
     protocol = results.protocol
     count = protocol.pairs_count

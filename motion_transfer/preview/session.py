@@ -249,8 +249,7 @@ class Session:
             reopens = changed.missing != self.options.missing  # which a folder is read by
             self.options = changed
             if reopens:
-                self.opening.give_up()
-                self.opening = self._open()
+                self._reopen()
             self._named = self._named or "name" in words
             self.opening.errors.pop("plan", None)
             if source is not None:
@@ -431,7 +430,6 @@ class Session:
             if self.driver is not None and self.error is None:
                 self._motion_before = self.motion
             self.motion = number
-            self.opening.give_up()
             background = self.options.background
             self.options = replace(
                 self.options,
@@ -448,7 +446,7 @@ class Session:
             self.plans = None
             self._errors.pop("inputs", None)
             self._name_output()
-            self.opening = self._open()
+            self._reopen()
         self._touch()
 
     def cancel_motion(self) -> None:
@@ -464,6 +462,10 @@ class Session:
         opening = Opening(self.options, self._estimates, scratch, self._plan, self._touch)
         self._openings.append(opening)
         return opening
+
+    def _reopen(self) -> None:
+        self.opening.give_up()
+        self.opening = self._open()
 
     def _plan(self, opening: Opening) -> None:
         """Plan from what is known. Raises: InputError."""

@@ -219,6 +219,16 @@ def drop(page: Any, target: str, *paths: Path) -> None:
     expect(page.locator("#drops")).not_to_be_visible()
 
 
+def demo_frames(folder: Path, count: int, *, empty: tuple[int, ...] = ()) -> Path:
+    """Write the first frames of the demo's driver, of which some show nobody, as pictures."""
+    folder.mkdir()
+    with av.open(str(DEMO / "driver.mkv")) as container:
+        for index, frame in zip(range(count), container.decode(video=0), strict=False):
+            pixels = frame.to_ndarray(format="rgb24") * (index not in empty)
+            Image.fromarray(pixels).save(folder / f"{index:03d}_IUV.png")
+    return folder
+
+
 def unfold(page: Any) -> None:
     """Show the rest of the output's options."""
     page.get_by_text("Quality, sound, command").click()
@@ -660,12 +670,7 @@ def test_a_clip_is_estimated_with_time_left_and_can_be_given_up(tmp_path, open_p
 
 
 def test_a_broken_frame_says_so_and_the_others_work(tmp_path, open_page, browser) -> None:
-    driver = tmp_path / "frames"
-    driver.mkdir()
-    with av.open(str(DEMO / "driver.mkv")) as container:
-        for index, frame in zip(range(8), container.decode(video=0), strict=False):
-            pixels = frame.to_ndarray(format="rgb24")
-            Image.fromarray(pixels).save(driver / f"{index:03d}_IUV.png")
+    driver = demo_frames(tmp_path / "frames", 8)
     (driver / "003_IUV.png").write_bytes(b"not a picture")
     inputs = ("--source", DEMO / "source.png", "--driver", driver, "--renderer", "texture")
     with previewing(tmp_path, *inputs) as running:
@@ -685,14 +690,7 @@ def test_a_broken_frame_says_so_and_the_others_work(tmp_path, open_page, browser
 
 def test_gaps_are_shown_and_filled(tmp_path, open_page) -> None:
     """A clip in which the person is away for a while: what its frames show can be chosen."""
-    driver = tmp_path / "frames"
-    driver.mkdir()
-    with av.open(str(DEMO / "driver.mkv")) as container:
-        for index, frame in zip(range(6), container.decode(video=0), strict=False):
-            pixels = frame.to_ndarray(format="rgb24")
-            if index in (3, 4):
-                pixels[...] = 0
-            Image.fromarray(pixels).save(driver / f"{index:03d}_IUV.png")
+    driver = demo_frames(tmp_path / "frames", 6, empty=(3, 4))
     inputs = ("--source", DEMO / "source.png", "--driver", driver, "--renderer", "texture")
     with previewing(tmp_path, *inputs) as running:
         page = open_page(running.link)

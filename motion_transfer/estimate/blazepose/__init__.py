@@ -105,9 +105,10 @@ class BlazePoseEstimator:
         frame = np.ascontiguousarray(frame)
         if self._for_photos:
             self.start_shot()
-        looks = [(number, [body]) for number, body in self._tracker.follow(frame)]
-        if self._for_photos:
-            looks = [(number, self._tracker.look_again(frame, body)) for number, (body,) in looks]
+        looks = [
+            (number, self._tracker.look_again(frame, body) if self._for_photos else [body])
+            for number, body in self._tracker.follow(frame)
+        ]
         seen = [(number, bodies[0]) for number, bodies in looks]
         self._details = DetailsInFrame(frame, seen, self._details, self._seconds)
         return partial(self._finish, looks, self._details, *frame.shape[:2])
@@ -161,18 +162,22 @@ class BlazePoseEstimator:
         )
 
     def _run_network(self, looks: list[SeenBody], window: Box) -> Float32[np.ndarray, "1 73 n n"]:
-        painted = None
-        for body in looks:
-            # it shrinks the mask to its own size: no need to see it much finer
-            mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
-            features = body.features.look(_into(window)) if body.features else None
-            (each,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
-            if len(looks) == 1:
-                return each
-            # a copy: the network's next answer overwrites this one
-            painted = each.copy() if painted is None else np.add(painted, each, out=painted)
-        assert painted is not None
-        return np.divide(painted, len(looks), out=painted)
+        """Give the mean of what the network says of each look; the next call may overwrite it."""
+        painted = self._ask_network(looks[0], window)
+        if len(looks) == 1:
+            return painted
+        painted = painted.copy()  # the network's next answer overwrites this one
+        for body in looks[1:]:
+            painted += self._ask_network(body, window)
+        painted /= len(looks)
+        return painted
+
+    def _ask_network(self, body: SeenBody, window: Box) -> Float32[np.ndarray, "1 73 n n"]:
+        # it shrinks the mask to its own size: no need to see it much finer
+        mask = _mask_in(body, window, min(window.width, 2 * MASK_SIZE))
+        features = body.features.look(_into(window)) if body.features else None
+        (painted,) = self._network.run(*body_arrays(body.landmarks, mask, features, window))
+        return painted
 
 
 @cache
