@@ -2,12 +2,14 @@
 
 What is made small, by Gauss-Newton steps: how far landmarks are from where the picture shows them,
 and (counting less) from BlazePose's metres; how much joints leave their usual angles; and how
-suddenly they move. Landmarks that do not fit the rest count less and less (Cauchy's weights), and
-so do sudden movements if the picture insists on them.
+suddenly they move; then once more, with feet that stand where they are. Landmarks that do not fit
+the rest count less and less (Cauchy's weights), and so do sudden movements if the picture insists
+on them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +17,18 @@ from jaxtyping import Float64
 from scipy.linalg import solveh_banded
 
 from motion_transfer.estimate.interface import LANDMARK
+from motion_transfer.tracking.contacts import Standing, find_standing, pull
 from motion_transfer.tracking.habits import usual_habits
-from motion_transfer.tracking.puppet import LAYOUT, PARAMETERS, Postures, Puppet
+from motion_transfer.tracking.puppet import LAYOUT, PARAMETERS, Points, Postures, Puppet, Slopes
 from motion_transfer.tracking.starting import Observed, find_flipped, first_postures, unflipped
 
 Blocks = Float64[np.ndarray, "N P P"]
 
 STEPS = 14
 """Gauss-Newton's; measured: later ones move no joint by a millimetre."""
+
+LAST_STEPS = 8
+"""Those with feet that stand."""
 
 IMAGE_SIGMA = 0.012
 """How far BlazePose's landmarks are off in the picture, as a share of the body's height there."""
@@ -89,6 +95,17 @@ def fit_postures(
     observed = unflipped(observed, flipped)
     postures = first_postures(puppet, observed, view.focal, view.centre)
     postures = refine(puppet, postures, observed, view, frame_rate)
+    standing = find_standing(
+        observed.image,
+        observed.weight,
+        puppet.place(postures).landmarks,
+        _height_px(puppet, postures, view),
+        frame_rate,
+    )
+    if standing:
+        postures = refine(
+            puppet, postures, observed, view, frame_rate, steps=LAST_STEPS, standing=standing
+        )
     return postures, int(flipped.sum())
 
 
@@ -99,13 +116,23 @@ def refine(
     view: View,
     frame_rate: float,
     steps: int = STEPS,
+    standing: Sequence[Standing] = (),
 ) -> Postures:
-    """Take Gauss-Newton steps towards what was observed."""
+    """Take Gauss-Newton steps towards what was observed.
+
+    Args:
+        standing: Feet that stand; the postures are taken for nearly right then.
+    """
     moments, habits = Moments.at(frame_rate), usual_habits()
     for step in range(steps):
         # wide at first: far-off starts must not be taken for outliers
-        width = CAUCHY * max(1.0, 8.0 / 2**step)
-        blocks, right = measure_misfit(puppet, postures, observed, view, width).equations()
+        width = CAUCHY if standing else CAUCHY * max(1.0, 8.0 / 2**step)
+        placed = puppet.place(postures)
+        slopes = placed.slopes()
+        height = _height_px(puppet, postures, view)
+        misfit = measure_misfit(placed.landmarks, slopes, observed, view, height, width)
+        blocks, right = misfit.equations()
+        pull(standing, placed.landmarks, slopes, blocks, right)
         habits.pull(postures, blocks, right)
         band = Band(blocks)
         moments.add(postures, band, right)
@@ -135,19 +162,20 @@ class Misfit:
 
 
 def measure_misfit(
-    puppet: Puppet,
-    postures: Postures,
+    points: Points,
+    slopes: Slopes,
     observed: Observed,
     view: View,
-    width: float = CAUCHY,
+    height_px: float,
+    width: float,
 ) -> Misfit:
     """Compare a body with what was observed.
 
     Args:
+        points, slopes: Where its landmarks are, and how they move, see `Placed`.
+        height_px: Of the body in the picture.
         width: Sigmas from which a landmark counts less and less.
     """
-    placed = puppet.place(postures)
-    points, slopes = placed.landmarks, placed.slopes()
     x, depth, z = np.moveaxis(points, -1, 0)
     depth = np.maximum(depth, LEAST_DEPTH)
     scale = view.focal / depth
@@ -155,13 +183,13 @@ def measure_misfit(
     # how the picture moves with a point: to the right, into it, up
     u = scale[..., None] * (slopes[:, :, 0] - (x / depth)[..., None] * slopes[:, :, 1])
     v = scale[..., None] * (-slopes[:, :, 2] + (z / depth)[..., None] * slopes[:, :, 1])
-    sigma = IMAGE_SIGMA * _height_px(puppet, postures, view)
+    sigma = IMAGE_SIGMA * height_px
     image = observed.weight * _cauchy((away**2).sum(-1) / sigma**2, width) / sigma**2
     apart = points - points[:, HIPS].mean(1, keepdims=True) - observed.world
     apart = apart / WORLD_SIGMA
     slopes = (slopes - slopes[:, HIPS].mean(1, keepdims=True)) / WORLD_SIGMA[:, None]
     world = observed.weight * _cauchy((apart**2).sum(-1), width)
-    count = len(postures)
+    count = len(points)
     weights = [np.repeat(weight[..., None], n, -1) for weight, n in ((image, 2), (world, 3))]
     return Misfit(
         np.concatenate([away, apart], 2).reshape(count, -1),

@@ -34,6 +34,7 @@ from motion_transfer.people import (
 from motion_transfer.tracking.landmarks import anchor_of, carrying_bones, rest_places
 
 Points = Float64[np.ndarray, "N L 3"]
+Slopes = Float64[np.ndarray, "N L 3 P"]
 Vectors = Float64[np.ndarray, "N 3"]
 Matrices = Float64[np.ndarray, "N 3 3"]
 Sides = Float64[np.ndarray, "N 2 3 3"]
@@ -181,7 +182,7 @@ class Placed:
     landmarks: Points
     handles: list[Handle]
 
-    def slopes(self) -> Float64[np.ndarray, "N L 3 P"]:
+    def slopes(self) -> Slopes:
         """Tell how each landmark moves with each number of a step."""
         count, landmarks = self.landmarks.shape[:2]
         out = np.zeros((count, landmarks, 3, PARAMETERS))
