@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ from click.core import ParameterSource
 
 from motion_transfer.cli.options import FILE, SectionCommand, described_options, pair_words, section
 from motion_transfer.cli.progress import choose_listener
+from motion_transfer.cli.serving import serve_page
 from motion_transfer.cli.terminal import tell
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
@@ -156,9 +155,4 @@ def _serve(
         return Session(options, folder, job_file, **begin)
 
     server = PreviewServer(port)
-    click.echo(server.link)
-    sys.stdout.flush()  # whoever reads it from a pipe waits for it
-    if open_browser:
-        click.launch(server.link)
-    with contextlib.suppress(KeyboardInterrupt):  # the way to end it
-        server.serve(open_session)
+    serve_page(server.link, lambda: server.serve(open_session), open_browser=open_browser)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
 from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
@@ -14,6 +12,7 @@ import click
 
 from motion_transfer.cli.options import FILE, WordsCommand, described_options, section
 from motion_transfer.cli.progress import CountBar
+from motion_transfer.cli.serving import serve_page
 from motion_transfer.cli.terminal import note, tell
 from motion_transfer.evaluation.options import OUTPUT
 from motion_transfer.evaluation.study.options import ScoreOptions, StudyOptions
@@ -111,9 +110,4 @@ def _serve_study(folder: Path, port: int, *, open_browser: bool) -> None:
     from motion_transfer.preview.study import open_study_server
 
     server = open_study_server(folder, port)
-    tell(server.link)
-    sys.stdout.flush()  # whoever reads it from a pipe waits for it
-    if open_browser:
-        click.launch(server.link)
-    with contextlib.suppress(KeyboardInterrupt):  # the way to end it
-        server.run()
+    serve_page(server.link, server.run, open_browser=open_browser)
