@@ -1,6 +1,7 @@
 """How near the IUV of raw photos comes to DensePose's, and how fast `mt iuv` is.
 
     MT_SAMPLES=folder .venv/bin/python benchmarks/estimate.py photos [--pictures OUT]
+    .venv/bin/python benchmarks/estimate.py people [--people 40] [--assets MAKEHUMAN] [--once]
     .venv/bin/python benchmarks/estimate.py clips [--people 8]
     .venv/bin/python benchmarks/estimate.py hands [--people 20]
     .venv/bin/python benchmarks/estimate.py heads [--people 75] [--assets MAKEHUMAN]
@@ -9,6 +10,9 @@
 `photos`: the folder holds real photos with DensePose's own IUV, `deepfashion/*.png` with
 `*_iuv.png` beside them, and `densepose_demo/demo_im.jpg` with `demo_im_IUV.png`, of which one
 person is taken.
+
+`people`: photos of held-out people, two each, and their exact IUV; every second one is a free
+person, where assets are given.
 
 `clips`: held-out people who stand still, seen by a camera with noise and a flickering exposure: how
 many of the body's pixels change their part from one frame to the next. And people who turn once
@@ -23,6 +27,8 @@ drawn. A direction is the turn of the head's mean surface that brings the places
 nearest to its pixels; it is compared with that of the exact IUV, and, as a check of the measure,
 both with the turn of the person's own head. Around each head, how many pixels have the right part,
 how far U and V are off, and how well the head is covered.
+
+`--heavy` looks with the estimator blazepose-heavy.
 
 `speed`: a clip of the demo's person, who goes to and fro, in H.264. Whole runs, decode to encode,
 in turns with those of another checkout of this project; then what each step takes alone.
@@ -98,20 +104,28 @@ print((len(stamps) - 1) / (stamps[-1] - stamps[0]), ended - began, time.process_
 def main() -> None:
     parser = argparse.ArgumentParser(description="The estimator.")
     ways = parser.add_subparsers(required=True)
-    photos = ways.add_parser("photos")
+    looks = argparse.ArgumentParser(add_help=False)
+    looks.add_argument("--heavy", action="store_true")
+    photos = ways.add_parser("photos", parents=[looks])
     photos.add_argument("--weights", type=Path)
     photos.add_argument("--pictures", type=Path, help="write photo, DensePose's and our IUV here")
     photos.set_defaults(do=compare_photos)
-    clips = ways.add_parser("clips")
+    people = ways.add_parser("people", parents=[looks])
+    people.add_argument("--people", type=int, default=40)
+    people.add_argument("--assets", type=Path, help="of free people")
+    people.add_argument("--weights", type=Path)
+    people.add_argument("--once", action="store_true", help="look as at the frames of a clip")
+    people.set_defaults(do=score_people)
+    clips = ways.add_parser("clips", parents=[looks])
     clips.add_argument("--people", type=int, default=8)
     clips.add_argument("--frames", type=int, default=60)
     clips.add_argument("--weights", type=Path)
     clips.set_defaults(do=score_clips)
-    hands = ways.add_parser("hands")
+    hands = ways.add_parser("hands", parents=[looks])
     hands.add_argument("--people", type=int, default=20)
     hands.add_argument("--pictures", type=Path, help="write photo, exact, coarse and fine IUV here")
     hands.set_defaults(do=score_hands)
-    heads = ways.add_parser("heads")
+    heads = ways.add_parser("heads", parents=[looks])
     heads.add_argument("--people", type=int, default=75)
     heads.add_argument("--assets", type=Path, help="of free people")
     heads.add_argument("--pictures", type=Path, help="write photo, exact, coarse and fine IUV here")
@@ -129,7 +143,9 @@ def main() -> None:
 
 def compare_photos(options: argparse.Namespace) -> None:
     """Print how near each photo's IUV comes to DensePose's."""
-    estimator = BlazePoseEstimator(weights=options.weights, most_people=1, for_photos=True)
+    estimator = BlazePoseEstimator(
+        heavy=options.heavy, weights=options.weights, most_people=1, for_photos=True
+    )
     names = list(IuvScore.__dataclass_fields__)
     print(f"{'':16}" + "".join(f"{name:>16}" for name in names))
     scores = []
@@ -148,6 +164,35 @@ def compare_photos(options: argparse.Namespace) -> None:
     means = [np.mean([getattr(score, n) for score in scores]) for n in names]
     print(f"{'mean':16}" + "".join(f"{mean:16.3f}" for mean in means))
     print(f"{'goal':16}" + "".join(f"{getattr(GOALS, n):16.3f}" for n in names))
+
+
+def score_people(options: argparse.Namespace) -> None:
+    """Print how near the IUV of held-out people's photos comes to the exact one."""
+    estimator = BlazePoseEstimator(
+        heavy=options.heavy,
+        weights=options.weights,
+        most_people=1,
+        smooth=False,
+        for_photos=not options.once,
+    )
+    streams = [PeopleStream(split="held-out", size=CLIP_SIZE)]
+    if options.assets:
+        free = PeopleStream(split="held-out", size=CLIP_SIZE, assets=options.assets, free_share=1.0)
+        streams.append(free)
+    scores, missed = [], 0
+    for number in range(options.people):
+        people = streams[number % len(streams)]
+        dressed = people.dress(number)
+        for view in range(2):
+            photo = people.take(dressed, people.shot(number, view))
+            estimator.start_shot()
+            found = estimator.estimate(photo.rgb)
+            if found:
+                scores.append(score_iuv(lay_iuv(found, *photo.rgb.shape[:2]), photo.iuv))
+            missed += not found
+    print(f"{len(scores)} photos; nobody was found in {missed} more")
+    for name in IuvScore.__dataclass_fields__:
+        print(f"{name} {np.nanmean([getattr(score, name) for score in scores]):.4f}")
 
 
 def list_photos(folder: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -176,7 +221,7 @@ def score_clips(options: argparse.Namespace) -> None:
     unsteady, turning = [], []
     for number in range(options.people):
         dressed, shot = people.dress(number), people.shot(number, 0)
-        estimator = BlazePoseEstimator(weights=options.weights, most_people=1)
+        estimator = BlazePoseEstimator(heavy=options.heavy, weights=options.weights, most_people=1)
         photo = people.take(dressed, replace(shot, grain=0)).rgb
         rng = np.random.default_rng(number)
         noisy = (with_noise(photo, rng) for _ in range(options.frames))
@@ -200,7 +245,7 @@ def score_clips(options: argparse.Namespace) -> None:
 def score_hands(options: argparse.Namespace) -> None:
     """Print how right hands are, drawn and only painted."""
     people = PeopleStream(split="held-out", size=HANDS_SIZE)
-    estimator = BlazePoseEstimator(most_people=1)
+    estimator = BlazePoseEstimator(heavy=options.heavy, most_people=1)
     rows, changed = [], 0
     for number in range(options.people):
         dressed = people.dress(number)
@@ -240,7 +285,8 @@ def score_hands(options: argparse.Namespace) -> None:
 def score_heads(options: argparse.Namespace) -> None:
     """Print how right heads are, drawn and only painted, by how they are turned."""
     people = PeopleStream(split="held-out", size=HEADS_SIZE, assets=options.assets)
-    estimator, places = BlazePoseEstimator(most_people=1), HeadPlaces()
+    estimator = BlazePoseEstimator(heavy=options.heavy, most_people=1)
+    places = HeadPlaces()
     details.find_hands = lambda *_: {}  # they take longest, and change no head
     rows: dict[str, list[list[float]]] = {name: [] for name in HEAD_TURNS}
     for number in range(options.people):

@@ -1,6 +1,6 @@
 """How near a body fitted to a clip comes to the one that was filmed, and what it costs.
 
-    .venv/bin/python benchmarks/tracking.py [--people 4] [--frames 40] [--pictures OUT]
+    .venv/bin/python benchmarks/tracking.py [--people 4] [--frames 40] [--heavy] [--pictures OUT]
 
 Held-out synthetic people walk, dance and turn before a camera that stands still. BlazePose's
 landmarks of the clip are fitted as `mt people track` does. The fitted body's IUV, drawn from the
@@ -42,6 +42,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Bodies fitted to clips.")
     parser.add_argument("--people", type=int, default=4)
     parser.add_argument("--frames", type=int, default=40)
+    parser.add_argument("--heavy", action="store_true", help="look with blazepose-heavy")
     parser.add_argument("--pictures", type=Path, help="write photos, painted and fitted IUV here")
     options = parser.parse_args()
     print(f"{'':12}{'':9}{'parts':>7}{'IoU':>7}{'U, V':>7}{'swapped':>9}{'turned':>8}{'cm':>6}")
@@ -78,11 +79,12 @@ def score_clip(name: str, number: int, options: argparse.Namespace) -> dict:
         for index, photo in enumerate(photos):
             cv2.imwrite(f"{folder}/{index:03d}.png", photo.rgb[..., ::-1])
         began = time.process_time()
-        painter = BlazePoseEstimator(most_people=1)
+        painter = BlazePoseEstimator(heavy=options.heavy, most_people=1)
         painted = [lay_iuv(painter.estimate(p.rgb), *p.rgb.shape[:2]) for p in photos]
         painting = time.process_time() - began
         began = time.process_time()
-        track = track_clip(open_pictures(Path(folder)), BlazePoseEstimator(most_people=1))
+        again = BlazePoseEstimator(heavy=options.heavy, most_people=1)
+        track = track_clip(open_pictures(Path(folder)), again)
         seconds = time.process_time() - began - painting
     fitted = [track.iuv(index, model) for index in range(len(track))]
     if options.pictures:

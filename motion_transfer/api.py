@@ -33,6 +33,7 @@ def render_video(
     estimator: str = "blazepose",
     estimator_model: AnyPath | None = None,
     fit_body: bool = False,
+    azimuth: float | None = None,
     renderer: str = "nhrr",
     weights: AnyPath | None = None,
     background: AnyPath = "white",
@@ -87,9 +88,10 @@ def render_video(
         missing: What frames show in which nobody is found: `hold`, `background` or `fail`.
         window: `auto`, or the square `X,Y,SIDE` of the driver's frame, px, that is drawn.
         frames: `"10:50"` or `(10, 50)`, half-open.
-        estimator: Who finds the IUV of raw pictures, `blazepose` or `densepose`.
+        estimator: Who finds the IUV of raw pictures, `blazepose`, `blazepose-heavy` or `densepose`.
         estimator_model: DensePose's file.
         fit_body: Give the driver's body the proportions of the source's.
+        azimuth: See a driver of raw pictures from so many degrees towards its left hand.
         renderer: `nhrr` (the network) or `texture` (a draft without it).
         weights: Checkpoint of the network, or `hf:owner/name`; else the one that ships.
         background: `white`, `black`, `#rrggbb`, `transparent`, a picture or a video; `photo` (the
@@ -148,6 +150,7 @@ def render_video(
             estimator=estimator,
             estimator_model=_path(estimator_model),
             fit_body=fit_body,
+            azimuth=azimuth,
             renderer=renderer,
             weights=_path(weights),
             background=str(background),

@@ -25,7 +25,8 @@ class Started:
 
 @dataclass(frozen=True)
 class Stage:
-    """A step of known length begins (`adapt`, `compare`, `estimate`, `look`, `scan`, `render`)."""
+    """A step of known length begins (`adapt`, `compare`, `estimate`, `track`,
+    `draw`, `look`, `scan`, `render`)."""
 
     event: ClassVar = "stage"
     name: str

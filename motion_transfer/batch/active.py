@@ -24,7 +24,7 @@ def scan_name(options: RenderOptions) -> str:
     return _name(
         *("scan", options.driver, options.missing, options.iuv_order, options.frames),
         *(options.driver_kind, options.driver_person, options.estimator, options.estimator_model),
-        *(partners, fitted),
+        *(options.azimuth, partners, fitted),
     )
 
 

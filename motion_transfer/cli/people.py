@@ -10,6 +10,7 @@ import click
 from motion_transfer.cli.options import FILE, CommandGroup, SectionCommand, section
 from motion_transfer.cli.progress import CountBar, long_wait
 from motion_transfer.cli.terminal import counted, note, tell
+from motion_transfer.estimate.opening import landmark_estimators
 from motion_transfer.option import parse_rate, parse_size
 
 SHARE = click.FloatRange(0, 1)
@@ -107,6 +108,12 @@ def drive(
     default="largest",
     metavar="WHO",
     help="largest (default), an index from the left (0 first), or a box x0,y0,x1,y1.",
+)
+@input_option(
+    "--estimator",
+    default="blazepose",
+    metavar="|".join(landmark_estimators()),
+    help="blazepose (default), or blazepose-heavy (nearer, slower; `mt models fetch --heavy`).",
 )
 @output_option("-o", "--output", type=FILE, required=True, help="A .bvh file.")
 @output_option("--force", is_flag=True, help="Replace an existing output.")

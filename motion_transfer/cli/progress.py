@@ -20,6 +20,8 @@ STAGE_WORDS = {
     "adapt": "learning the person",
     "compare": "comparing bodies",
     "estimate": "finding the driver's person",
+    "track": "finding the driver's person",
+    "draw": "drawing the driver's motion",
     "background": "taking the driver's person out",
     "scan": "reading driver",
     "render": "rendering",

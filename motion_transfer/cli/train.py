@@ -284,6 +284,7 @@ def iuv() -> None:
     metavar="DIR",
     help="Folder of MakeHuman's assets, which half of them wear; else MT_ASSETS, if it is set.",
 )
+@click.option("--heavy", is_flag=True, help="See them as the estimator blazepose-heavy does.")
 @click.option("--workers", type=click.IntRange(1), help="Processes; default: one for each core.")
 @quiet_option
 def make(data: Path, quiet: bool, **options: Any) -> None:

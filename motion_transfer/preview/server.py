@@ -211,8 +211,12 @@ class _Handlers:
         )
 
     async def choose_motion(self, request: Request) -> Response:
-        """Take a known motion, or several files of one drop as one."""
-        return await self._do("choose_motion", _numbers(await read_body(request)))
+        """Take a known motion, or several files of one drop as one, maybe seen from elsewhere."""
+        body = await read_body(request)
+        azimuth = body.get("azimuth", 0)
+        if type(azimuth) not in (int, float) or not -360 <= azimuth <= 360:
+            raise InputError("an azimuth is expected, degrees in -360..360")
+        return await self._do("choose_motion", _numbers(body), float(azimuth))
 
     async def cancel_motion(self, _request: Request) -> Response:
         """Give up a driver that is being read."""

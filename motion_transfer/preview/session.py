@@ -17,9 +17,11 @@ from jaxtyping import UInt8
 from motion_transfer.drawing.source import Source
 from motion_transfer.errors import InputError
 from motion_transfer.events import Event, FramesDone, Stage
+from motion_transfer.extras import missing_packages
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.option import SCENES
+from motion_transfer.people import is_motion
 from motion_transfer.preview.changes import SCENE, change_options
 from motion_transfer.preview.choices import Choice, built_in_motions, example_people
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
@@ -95,7 +97,8 @@ class Session:
             self.people.append(Choice(garment.photo, garment.photo.name, garment.iuv))
         self.motions = built_in_motions()
         self.motion = self.know_motion(options.driver)
-        self._motion_before = 0
+        self.azimuth = options.azimuth or 0.0
+        self._before = 0, 0.0
         self._backgrounds = [str(path)] if (path := options.background_file) else []
         self._named = names_output
         self._inputs = Inputs()
@@ -415,11 +418,14 @@ class Session:
             self.motions.append(Choice(path, path.name))
             return len(self.motions) - 1
 
-    def choose_motion(self, numbers: Sequence[int]) -> None:
+    def choose_motion(self, numbers: Sequence[int], azimuth: float = 0.0) -> None:
         """Take a known motion, or several frames that were sent together as one.
 
         What is drawn of the one before is given up; its range, window and rate go with it.
-        Raises: InputError if there is none of these numbers.
+
+        Args:
+            azimuth: From where it is seen, degrees towards the left hand of who moves; 0: as it is.
+        Raises: InputError if there is none of these numbers, or it cannot be seen from there.
         """
         with self.lock:
             if not numbers or not all(0 <= number < len(self.motions) for number in numbers):
@@ -427,13 +433,14 @@ class Session:
             number = numbers[0]
             if len(numbers) > 1:  # of one drop: they lie in a folder of their own
                 number = self.know_motion(self.motions[number].path.parent)
-            if self.driver is not None and self.error is None:
-                self._motion_before = self.motion
-            self.motion = number
-            background = self.options.background
-            self.options = replace(
+            path, background = self.motions[number].path, self.options.background
+            turned = azimuth or None
+            if turned and is_motion(path):  # of settings that are given twice, the last one counts
+                path, turned = Path(f"{path},azimuth={azimuth:g}"), None
+            options = replace(
                 self.options,
-                driver=self.motions[number].path,
+                driver=path,
+                azimuth=turned,
                 driver_kind=None,
                 iuv_order=None,
                 driver_person="largest",
@@ -443,6 +450,9 @@ class Session:
                 partners=(),
                 background="white" if background == "driver" else background,
             )
+            if self.driver is not None and self.error is None:
+                self._before = self.motion, self.azimuth
+            self.options, self.motion, self.azimuth = options, number, azimuth
             self.plans = None
             self._errors.pop("inputs", None)
             self._name_output()
@@ -451,7 +461,17 @@ class Session:
 
     def cancel_motion(self) -> None:
         """Give up a driver that is still being estimated, and go back to the one before."""
-        self.choose_motion([self._motion_before])
+        number, azimuth = self._before
+        self.choose_motion([number], azimuth)
+
+    @property
+    def can_turn(self) -> bool:
+        """Whether the motion can be seen from elsewhere: IUV is what one camera saw."""
+        with self.lock:
+            path, driver = self.motions[self.motion].path, self.driver
+        if missing_packages("people"):
+            return False
+        return is_motion(path) or (driver is not None and driver.opened.pictures is not None)
 
     @property
     def _estimates(self) -> Path:

@@ -96,6 +96,8 @@ def _motion(session: Session) -> dict[str, Any]:
     return {
         "motions": [{"number": n, "name": each.name} for n, each in enumerate(session.motions)],
         "motion": session.motion,
+        "azimuth": session.azimuth,
+        "can_turn": session.can_turn,
         "driver": driver
         and {
             "name": session.motions[session.motion].name,

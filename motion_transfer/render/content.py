@@ -37,7 +37,7 @@ KEYED_ELSEWHERE = {
     *("source", "source_iuv", "garments", "weights", "adapt"),  # by the files' content
     *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
     *("frames", "frame_rate"),  # by the plan
-    *("driver_kind", "estimator", "estimator_model", "fit_body"),  # by the source and the plan
+    *("driver_kind", "estimator", "estimator_model", "fit_body", "azimuth"),  # likewise
     *("renderer", "engine", "precision", "device"),  # by the recipe
     *("codec", "crf", "pix_fmt", "alpha"),  # by the format
     *("partners", "background"),  # by the cast, and by the file's content
@@ -156,13 +156,15 @@ def _background_facts(options: RenderOptions) -> str:
 
 def driver_key(options: InputOptions) -> str:
     """Compute the key of the IUV of a driver that is raw pictures. Raises: InputError."""
-    fitted = {"fit": _fit_facts(options)} if options.fit_body else {}
+    changed: dict[str, Any] = {"fit": _fit_facts(options)} if options.fit_body else {}
+    if options.azimuth is not None:
+        changed["azimuth"] = options.azimuth
     return key_of(
         {
             "driver": digest_file(options.driver, "driver"),
             "person": options.driver_person,
             "frames": options.frames,
-            **fitted,
+            **changed,
             **_estimator_facts(options),
         }
     )

@@ -162,6 +162,16 @@ def open_driver(options: InputOptions, folder: Path, listener: Listener) -> Driv
         pictures = estimate_driver(options, folder, listener, inputs)
         file = DriverFile(pictures.iuv, "fail", ORDER)
         return Driver(options.driver, file, file.open(), pictures.frame_rate, inputs, pictures)
+    if options.azimuth is not None:
+        advice = (
+            f"write {options.driver},azimuth={options.azimuth:g}"
+            if is_motion(options.driver)
+            else "give the video or pictures that it was made from"
+        )
+        raise InputError(
+            f"--azimuth fits a body to pictures, and {options.driver} is none; {advice}, or leave"
+            " out --azimuth"
+        )
     if options.fit_body:
         raise InputError(
             f"--fit-body compares landmarks, and IUV as in the driver {options.driver} has none;"

@@ -1,7 +1,8 @@
 """Drivers that are raw pictures: their IUV is found once, and kept as a lossless video.
 
 The engine then reads that video as any other driver: in chunks, in parallel, again after a crash.
-With `--fit-body` the driver's body gets the source's proportions on the way.
+With `--fit-body` the driver's body gets the source's proportions on the way; with `--azimuth` a
+body that is fitted to the clip is drawn instead, as another camera sees it.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ import json
 import logging
 import shutil
 import uuid
+from collections.abc import Generator
 from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import UInt8
 
 from motion_transfer.drawing.kept_source import load_picture
 from motion_transfer.drawing.person import Follower, bounding_box
@@ -40,7 +45,10 @@ from motion_transfer.media.work import digest_of
 from motion_transfer.render.content import driver_key
 from motion_transfer.render.inputs import is_clip
 from motion_transfer.render.options import InputOptions, SourceOptions, is_kept
-from motion_transfer.render.plan import frame_range
+from motion_transfer.render.plan import frame_range, list_stretches
+
+if TYPE_CHECKING:
+    from motion_transfer.tracking import Track
 
 ORDER: ChannelOrder = "iuv"
 """Of the channels of the video that is kept."""
@@ -127,15 +135,8 @@ def _make(
 ) -> PictureDriver:
     pictures = open_pictures(options.driver)
     chosen = frame_range(options.frames, pictures.frame_count, str(options.driver))
-    fit = _match_body(options, pictures, chosen, listener) if options.fit_body else None
-    estimator = open_estimator(
-        options.estimator, options.estimator_model, frame_rate=pictures.frame_rate, fit=fit
-    )
-    listener(Stage("estimate", chosen.stop))
-    summary = ClipSummary()
-    frames = estimate_clip(
-        pictures, estimator, person=options.driver_person, chosen=chosen, summary=summary
-    )
+    look = _estimate if options.azimuth is None else _fit_moving_body
+    frames, found = look(options, pictures, chosen, listener)
     written = _temporary(iuv)
     iuv.parent.mkdir(parents=True, exist_ok=True)
     settings = IuvOutput(
@@ -152,9 +153,81 @@ def _make(
         key,
         pictures.frame_rate,
         pictures.start_seconds,
-        tuple(summary.shots),
-        pictures.notes,
+        tuple(found.cuts),
+        (*pictures.notes, *found.notes),
     )
+
+
+@dataclass
+class _Found:
+    """What is known of a clip when its frames are drawn: cuts, and what the user should know."""
+
+    cuts: list[int] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+Frames = Generator[UInt8[np.ndarray, "H W 3"], None, None]
+
+
+def _estimate(
+    options: InputOptions, pictures: PictureStream, chosen: range, listener: Listener
+) -> tuple[Frames, _Found]:
+    """Find the person's IUV frame by frame."""
+    fit = _match_body(options, pictures, chosen, listener) if options.fit_body else None
+    estimator = open_estimator(
+        options.estimator, options.estimator_model, frame_rate=pictures.frame_rate, fit=fit
+    )
+    listener(Stage("estimate", chosen.stop))
+    summary = ClipSummary()
+    frames = estimate_clip(
+        pictures, estimator, person=options.driver_person, chosen=chosen, summary=summary
+    )
+    return frames, _Found(summary.shots)
+
+
+def _fit_moving_body(
+    options: InputOptions, pictures: PictureStream, chosen: range, listener: Listener
+) -> tuple[Frames, _Found]:
+    """Fit a body to the person's motion, and draw it from elsewhere; nobody before what is chosen.
+
+    Raises: InputError without the extra, if nobody is found, or in a frame where `--missing fail`
+        wants somebody.
+    """
+    assert options.azimuth is not None
+    from motion_transfer.people import FIRST_USE, is_cached
+    from motion_transfer.tracking import track_clip  # with the extra alone
+
+    if not is_cached():
+        listener(Notice(FIRST_USE))  # now: what follows takes minutes
+    estimator = open_estimator(options.estimator, None, frame_rate=pictures.frame_rate)
+    listener(Stage("track", chosen.stop))
+    track = track_clip(
+        pictures,
+        estimator,
+        person=options.driver_person,
+        chosen=chosen,
+        done=lambda count: listener(FramesDone(count)),
+    )
+    unseen = [(start + chosen.start, stop + chosen.start) for start, stop in track.unseen]
+    notes = []
+    if unseen:
+        where = list_stretches(unseen, 0, track.frame_rate)
+        if options.missing == "fail":
+            raise InputError(
+                f"{options.driver}: nobody found in {where}; cut the clip there, or choose another"
+                " --missing"
+            )
+        notes = [f"nobody found in {where}; filled in between what is before and after"]
+    listener(Stage("draw", chosen.stop))
+    cuts = [shot.frames.start + chosen.start for shot in track.shots]
+    return _after_nobody(track, options.azimuth, chosen.start), _Found(cuts, notes)
+
+
+def _after_nobody(track: Track, azimuth: float, empty: int) -> Frames:
+    first = track.shots[0].camera
+    for _ in range(empty):
+        yield np.zeros((first.height, first.width, 3), np.uint8)
+    yield from track.seen_from(azimuth)
 
 
 def _match_body(

@@ -175,16 +175,18 @@ def _look(record: Record, options: VerifyOptions) -> Iterator[Finding]:
     words = record.options
     sources = record.sources[0]
     garments = len(words.get("garments", ()))
-    yield from _look_at_pictures("--source", sources[: len(sources) - garments], _people(options))
+    yield from _look_at_pictures(
+        "--source", sources[: len(sources) - garments], _people(record, options)
+    )
     yield from _look_at_pictures(
         "--garment",
         sources[-garments:] if garments else (),
-        [person for each in options.garments for person in _people(options, each)],
+        [person for each in options.garments for person in _people(record, options, each)],
     )
     yield from _look_at_pictures(
         "--partner",
         [picture for pictures in record.sources[1:] for picture in pictures],
-        [person for each in options.partners for person in _people(options, each)],
+        [person for each in options.partners for person in _people(record, options, each)],
     )
     yield _look_at_driver(record, options)
     if record.weights is not None:
@@ -199,8 +201,13 @@ def _look(record: Record, options: VerifyOptions) -> Iterator[Finding]:
         yield Finding("--estimator-model", words["estimator_model"], NOT_GIVEN)
 
 
-def _people(options: VerifyOptions, words: str | None = None) -> list[tuple[PictureFacts, Path]]:
-    """Tell what the given pictures hold, the sources or one that is written `PHOTO[,IUV]`."""
+def _people(
+    record: Record, options: VerifyOptions, words: str | None = None
+) -> list[tuple[PictureFacts, Path]]:
+    """Tell what the given pictures hold, the sources or one that is written `PHOTO[,IUV]`.
+
+    IUV is estimated as it was, as far as the models are given.
+    """
     photos, iuv = options.source, options.source_iuv
     if words is not None:
         photo, comma, beside = words.partition(",")
@@ -208,7 +215,11 @@ def _people(options: VerifyOptions, words: str | None = None) -> list[tuple[Pict
     if not photos:
         return []
     model = options.estimator_model
-    estimator = {} if model is None else {"estimator": "densepose", "estimator_model": model}
+    estimator: dict[str, Any] = {}
+    if model is not None:
+        estimator = {"estimator": "densepose", "estimator_model": model}
+    elif "estimator" in record.options and "estimator_model" not in record.options:
+        estimator = {"estimator": record.options["estimator"]}
     person = SourceOptions(source=photos, source_iuv=iuv, **estimator)
     return [(PictureFacts(path.name, **facts), path) for path, facts in picture_facts(person)]
 

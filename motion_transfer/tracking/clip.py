@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 
 import numpy as np
-from jaxtyping import Bool, Float64, UInt8
+from jaxtyping import Bool, Float32, Float64, UInt8
 
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.clip import follow_people
@@ -23,6 +23,7 @@ from motion_transfer.people import (
     Bones,
     Camera,
     Shape,
+    frame_points,
     load_body_model,
     load_charts,
     render_iuv,
@@ -41,6 +42,10 @@ WINDOW, OVERLAP = 300, 60
 MOST_TILT = np.radians(35)
 TILT_SHARE = 0.6
 """How much of the body's mean lean towards the camera or away is taken for the camera's tilt."""
+
+CAMERA_METRES = 4.0  # of a camera that sees the motion from elsewhere, from its middle
+CAMERA_POSES, CAMERA_STEP = 48, 8
+"""Of a shot, instants that such a camera is made to hold, and one in so many vertices."""
 
 ON_FLOOR = 0.05
 """Share of the frames in which the lower foot may dip below the floor."""
@@ -99,11 +104,36 @@ class Track:
         """Find those of all frames."""
         return (self.bones(frame) for frame in range(len(self)))
 
+    def points(self, frame: int, model: BodyModel) -> Float32[np.ndarray, "V 3"]:
+        """Place the body's vertices in a frame, metres."""
+        return model.pose(self.body, self.body.transforms(*self.bones(frame)))
+
     def iuv(self, frame: int, model: BodyModel) -> UInt8[np.ndarray, "H W 3"]:
         """Draw the body over its picture, (I, U, V)."""
         (shot,) = (shot for shot in self.shots if frame in shot.frames)
-        points = model.pose(self.body, self.body.transforms(*self.bones(frame)))
-        return render_iuv(points, model.faces, load_charts(), shot.camera)
+        return render_iuv(self.points(frame, model), model.faces, load_charts(), shot.camera)
+
+    def seen_from(self, azimuth: float) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
+        """Draw the body of all frames as another camera sees it, as large as the pictures.
+
+        It stands still in each shot and holds all of its motion, as high as the pictures' camera.
+
+        Args:
+            azimuth: How far it stands from theirs, towards the person's left hand, degrees.
+        """
+        model, charts = load_body_model(), load_charts()
+        for shot in self.shots:
+            instants = np.linspace(shot.frames[0], shot.frames[-1], CAMERA_POSES).round()
+            poses = [self.points(int(frame), model)[::CAMERA_STEP] for frame in set(instants)]
+            camera = frame_points(
+                np.concatenate(poses),
+                (shot.camera.width, shot.camera.height),
+                distance=CAMERA_METRES,
+                azimuth=np.radians(azimuth),
+                elevation=shot.camera.elevation,
+            )
+            for frame in shot.frames:
+                yield render_iuv(self.points(frame, model), model.faces, charts, camera)
 
 
 def track_clip(
@@ -111,6 +141,7 @@ def track_clip(
     estimator: Estimator,
     *,
     person: str = "largest",
+    chosen: range | None = None,
     shape: Shape | None = None,
     done: Callable[[int], object] = int,
 ) -> Track:
@@ -118,15 +149,17 @@ def track_clip(
 
     Args:
         person: `largest`, an index from the left, or a box; see `Follower`.
+        chosen: The frames that are tracked; None: all.
         shape: The body's; None: the middle of all.
         done: Called with 1 after each frame that was looked at.
     Raises: InputError if nobody is found in any frame, or for a frame that is broken.
     """
-    found, starts = find_landmarks(pictures, estimator, person, done)
+    chosen = chosen or range(pictures.frame_count)
+    found, starts = find_landmarks(pictures, estimator, person, chosen, done)
     if not any(found):
         raise InputError(
-            f"{pictures.where(0)} to {len(found) - 1}: nobody found; a motion needs a person whose"
-            " body is seen"
+            f"{pictures.where(chosen.start)} to {chosen.stop - 1}: nobody found; a motion needs a"
+            " person whose body is seen"
         )
     model = load_body_model()
     puppet = Puppet(model.body(shape or Shape()), model)
@@ -135,16 +168,25 @@ def track_clip(
 
 
 def find_landmarks(
-    pictures: PictureStream, estimator: Estimator, person: str, done: Callable[[int], object] = int
+    pictures: PictureStream,
+    estimator: Estimator,
+    person: str,
+    chosen: range,
+    done: Callable[[int], object] = int,
 ) -> tuple[list[Landmarks | None], list[int]]:
-    """Find one person's landmarks in every frame, None where it is not seen, and all cuts."""
+    """Find one person's landmarks in the chosen frames, None where it is not seen, and all cuts.
+
+    Both count from the first chosen frame.
+    """
     found: list[Landmarks | None] = []
     starts = []
-    frames = follow_people(pictures, estimator, person, range(pictures.frame_count))
+    frames = follow_people(pictures, estimator, person, chosen)
     with closing(frames):
         for seen in frames:
+            if not seen.is_chosen:
+                continue
             if seen.begins:
-                starts.append(seen.index)
+                starts.append(seen.index - chosen.start)
             found.append(seen.people[0].landmarks if seen.people else None)
             done(1)
     return found, starts

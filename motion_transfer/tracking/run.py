@@ -9,16 +9,13 @@ from pathlib import Path
 from motion_transfer.drawing.person import EVERYBODY, Follower
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.estimate.interface import Estimator
-from motion_transfer.estimate.opening import open_estimator
+from motion_transfer.estimate.opening import landmark_estimators, open_estimator
 from motion_transfer.extras import require_extra
 from motion_transfer.media.pictures.formats import open_pictures
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.people import write_bvh
 from motion_transfer.tracking.clip import Track, track_clip
-
-ESTIMATOR = "blazepose"
-"""The one that gives landmarks."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,12 +26,15 @@ class TrackOptions:
         source: A video, a folder of photos, or a photo.
         output: A `.bvh`.
         person: `largest`, an index from the left, or a box `x0,y0,x1,y1` in px.
-    Raises: InputError for a choice that means nobody, or everybody; OutputError for another file.
+        estimator: Who finds the landmarks, `blazepose` or `blazepose-heavy`.
+    Raises: InputError for a choice that means nobody, or everybody, or for an estimator without
+        landmarks; OutputError for another file.
     """
 
     source: Path
     output: Path
     person: str = "largest"
+    estimator: str = "blazepose"
     force: bool = False
 
     def __post_init__(self) -> None:
@@ -45,6 +45,11 @@ class TrackOptions:
                 "a motion is one person's; choose largest, an index from the left, or a box"
             )
         Follower(self.person)  # refuses what is no choice
+        if self.estimator not in landmark_estimators():
+            supported = " and ".join(landmark_estimators())
+            raise InputError(
+                f"estimator {self.estimator!r}; those that give landmarks are {supported}"
+            )
 
 
 def track_motion(
@@ -57,7 +62,7 @@ def track_motion(
 
     Args:
         done: Called with 1 and the number of all frames after each frame.
-        estimator: One that is ready; None opens BlazePose.
+        estimator: One that is ready; None opens that of the options.
     Raises: InputError and its kinds, also for a source that changes meanwhile; nothing half-written
         stays behind.
     """
@@ -65,7 +70,7 @@ def track_motion(
     inputs = Inputs([options.source])
     pictures = open_pictures(options.source)
     check_destination(options.output, force=options.force)
-    estimator = estimator or open_estimator(ESTIMATOR, None, frame_rate=pictures.frame_rate)
+    estimator = estimator or open_estimator(options.estimator, None, frame_rate=pictures.frame_rate)
     track = track_clip(
         pictures,
         estimator,

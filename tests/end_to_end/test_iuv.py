@@ -155,7 +155,10 @@ def test_half_written_output_is_never_left(tmp_path: Path, mt, red) -> None:
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["--estimator", "magic"], "estimator 'magic'; supported are blazepose, densepose"),
+        (
+            ["--estimator", "magic"],
+            "estimator 'magic'; supported are blazepose, blazepose-heavy, densepose",
+        ),
         (["--estimator", "densepose"], "needs its model"),
         (["--model", "a.pt"], "leave it out, or choose the densepose"),
         (["--person", "somebody"], "write largest, an index"),

@@ -23,7 +23,7 @@ import av
 import pytest
 from PIL import Image
 
-from motion_transfer.estimate.models import missing_models
+from motion_transfer.estimate.fetching import missing_models
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
 expect = playwright.expect
@@ -397,6 +397,20 @@ def test_photos_are_dropped_looked_at_and_removed(page, preview, tmp_path) -> No
     page.get_by_role("button", name="Remove again.png").click()
     expect(page.locator("#subject")).to_have_text("source.png in the motion of Dance")
     expect(tiles).to_have_count(1)
+
+
+def test_a_motion_is_seen_from_another_side(page, body_model) -> None:
+    side = page.get_by_label("Seen from")
+    expect(side).not_to_be_visible()  # IUV is what one camera saw
+    page.get_by_role("button", name="Motion: Walk").click()
+    expect(side).to_have_value("0")
+    side.select_option("their left side")
+    command = page.get_by_label("The same as a command")
+    expect(command).to_contain_text("--driver people:walk,azimuth=90")
+    expect(side).to_have_value("90")
+    shows(page, 0)
+    page.get_by_role("button", name="Motion: Dance", exact=True).click()
+    expect(side).not_to_be_visible()
 
 
 def test_a_draft_gives_way_to_the_network(page) -> None:

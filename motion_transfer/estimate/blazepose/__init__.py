@@ -32,10 +32,11 @@ from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
 from motion_transfer.estimate.models import (
     DETECTOR,
+    HEAVY_LANDMARKER,
     LANDMARKER,
-    MODEL_FILES,
     digest,
     find_model,
+    wanted_files,
 )
 from motion_transfer.estimate.surfaces.hand_drawing import hand_room, lay_hand
 from motion_transfer.estimate.surfaces.head_drawing import lay_head
@@ -50,6 +51,8 @@ class BlazePoseEstimator:
     """What turns frames into people, one shot after another; frames come from one thread at a time.
 
     Args:
+        heavy: Whether to look with the large landmark model, which sees more and takes 3.4 times as
+            long.
         weights: Of the network that paints IUV; None means those that ship.
         most_people: How many are followed at once.
         smooth: Whether to smooth landmarks between frames; for photos that have nothing to do with
@@ -64,6 +67,7 @@ class BlazePoseEstimator:
     def __init__(
         self,
         *,
+        heavy: bool = False,
         weights: Path | None = None,
         most_people: int = 4,
         smooth: bool = True,
@@ -72,14 +76,21 @@ class BlazePoseEstimator:
         for_photos: bool = False,
     ) -> None:
         with ThreadPoolExecutor() as threads:  # each takes a quarter of a second
-            painter = partial(_open_painter, weights) if weights else _open_shipped
+            landmarker = HEAVY_LANDMARKER if heavy else LANDMARKER
+            painter = partial(_open_painter, weights) if weights else partial(_open_shipped, heavy)
             network = threads.submit(painter)
             detector = threads.submit(PersonDetector, find_model(DETECTOR))
-            threads.submit(LandmarkModel, find_model(LANDMARKER)).result()
+            threads.submit(LandmarkModel, find_model(landmarker)).result()
             detector.result()  # the tracker finds them open
         self._network = network.result()
         smooth = smooth and not for_photos
-        self._tracker = BodyTracker(most_people=most_people, smooth=smooth, frame_rate=frame_rate)
+        self._tracker = BodyTracker(
+            landmarker=landmarker,
+            most_people=most_people,
+            smooth=smooth,
+            frame_rate=frame_rate,
+            mirror=not for_photos,  # which `look_again` sees to
+        )
         self._fit, self._for_photos = fit, for_photos
         self._seconds = 1 / frame_rate if smooth else None
         self._details: DetailsInFrame | None = None
@@ -181,19 +192,19 @@ class BlazePoseEstimator:
 
 
 @cache
-def _open_shipped() -> CpuNetwork:
-    return _open_painter(find_shipped())
+def _open_shipped(heavy: bool) -> CpuNetwork:
+    return _open_painter(find_shipped(heavy=heavy))
 
 
 def _open_painter(weights: Path) -> CpuNetwork:
     return CpuNetwork(build_graph(weights), at_once=AT_ONCE)
 
 
-def model_facts(_model: None = None) -> dict[str, Any]:
+def model_facts(_model: None = None, *, heavy: bool = False) -> dict[str, Any]:
     """Tell what decides the answers, for keys of content: the models, and the network's weights."""
-    network = shipped_file()
+    network = shipped_file(heavy=heavy)
     return {
-        "models": [file.sha256 for file in MODEL_FILES],
+        "models": [file.sha256 for file in wanted_files(heavy=heavy)],
         "network": digest(network.read_bytes()) if network.is_file() else None,
     }
 

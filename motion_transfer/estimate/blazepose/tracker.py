@@ -16,7 +16,7 @@ from jaxtyping import UInt8
 from motion_transfer.estimate.blazepose.networks import LandmarkModel, PersonDetector, SeenBody
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.interface import mean_landmarks
-from motion_transfer.estimate.models import DETECTOR, LANDMARKER, find_model
+from motion_transfer.estimate.models import DETECTOR, LANDMARKER, ModelFile, find_model
 
 NEWCOMERS_EVERY = 12  # frames between two searches while everybody is in sight
 LEAST_NEWCOMER = 0.75  # presence from which somebody is followed; ghosts have less
@@ -54,10 +54,13 @@ class BodyTracker:
     """People and their landmarks, frame after frame; one object serves one thread.
 
     Args:
+        landmarker: The landmark model's file.
         most_people: How many are followed at once; the most certain ones.
         smooth: Whether to smooth the landmarks between frames.
         frame_rate: Frames per second, for smoothing.
-        second_looks: At somebody new; MediaPipe's own tracker has none.
+        mirror: Whether to look at everybody in a mirror, too, and take the mean of both looks'
+            landmarks; MediaPipe's own tracker does not.
+        second_looks: At somebody new; MediaPipe's has none.
         steady: The change of a region from which one looks elsewhere; MediaPipe's tracker does so
             in every frame.
     Raises: InputError where the models are missing.
@@ -66,16 +69,18 @@ class BodyTracker:
     def __init__(
         self,
         *,
+        landmarker: ModelFile = LANDMARKER,
         most_people: int = 4,
         smooth: bool = True,
         frame_rate: float = 30.0,
+        mirror: bool = True,
         second_looks: int = SECOND_LOOKS,
         steady: float = STEADY,
     ) -> None:
         self._detector = PersonDetector(find_model(DETECTOR))
-        self._landmarker = LandmarkModel(find_model(LANDMARKER))
+        self._landmarker = LandmarkModel(find_model(landmarker))
         self._most_people, self._smooth = most_people, smooth
-        self._second_looks, self._steady = second_looks, steady
+        self._mirror, self._second_looks, self._steady = mirror, second_looks, steady
         self._seconds = 1 / frame_rate
         self._numbers = 0
         self.start_shot()
@@ -142,6 +147,10 @@ class BodyTracker:
             track.number, self._numbers = self._numbers, self._numbers + 1
         if track.region.change_to(body.next_region) > self._steady:
             track.region = body.next_region
+        if self._mirror:
+            mirrored = self._landmarker.locate(frame, body.region, mirrored=True)
+            both = [look.landmarks for look in (body, mirrored) if look is not None]
+            body = replace(body, landmarks=mean_landmarks(both))
         seen.append((track, body))
 
     def _search(self, frame: np.ndarray, *, everywhere: bool) -> list[Region]:

@@ -20,7 +20,7 @@ PARTS = PART_COUNT + 1  # and the background
 FINER = 2  # output pixels a cell and side
 MOST_LEVELS = 7  # the last one is a single cell
 WIDEST = 4096
-SHIPPED = "iuv_network.safetensors"
+SHIPPED, SHIPPED_HEAVY = "iuv_network.safetensors", "iuv_network_heavy.safetensors"
 WHAT = "weights of the IUV network in"
 
 Weights = Mapping[str, Array]
@@ -106,9 +106,13 @@ def _list_shapes(config: IuvNetworkConfig) -> Iterator[tuple[str, tuple[int, ...
             yield f"{name}.{conv}_norm.num_batches_tracked", ()
 
 
-def shipped_file() -> Path:
-    """Name the file of the weights that come with the package."""
-    return Path(__file__).parents[1] / SHIPPED
+def shipped_file(*, heavy: bool = False) -> Path:
+    """Name the file of the weights that come with the package.
+
+    Args:
+        heavy: Those for what the large landmark model sees.
+    """
+    return Path(__file__).parents[1] / (SHIPPED_HEAVY if heavy else SHIPPED)
 
 
 def has_shipped() -> bool:
@@ -116,11 +120,12 @@ def has_shipped() -> bool:
     return shipped_file().is_file()
 
 
-def find_shipped() -> Path:
-    """Find the weights that come with the package. Raises: WeightsError."""
-    if not has_shipped():
+def find_shipped(*, heavy: bool = False) -> Path:
+    """Find the weights that come with the package, see `shipped_file`. Raises: WeightsError."""
+    file = shipped_file(heavy=heavy)
+    if not file.is_file():
         raise WeightsError(
-            f"this installation lacks {SHIPPED}, the weights with which the blazepose estimator"
+            f"this installation lacks {file.name}, the weights with which the blazepose estimator"
             " paints IUV; choose the densepose estimator with a model of yours, or give IUV"
         )
-    return shipped_file()
+    return file

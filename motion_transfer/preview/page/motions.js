@@ -1,15 +1,27 @@
 // Whose motion it is: those that come with the program, and others that are dropped or chosen.
 
 import { byId, make, setText } from "./dom.js";
+import { fill } from "./options.js";
 import { choosingFiles, Taker } from "./sending.js";
 import { ask } from "./server.js";
+
+const VIEWS = [ // degrees towards the left hand of who moves
+  ["0", "its own camera"],
+  ["45", "45° to their left"],
+  ["90", "their left side"],
+  ["135", "135° to their left"],
+  ["180", "the other side"],
+  ["-135", "135° to their right"],
+  ["-90", "their right side"],
+  ["-45", "45° to their right"],
+];
 
 /** Returns what takes files. */
 export function setUpMotions(looking) {
   const taker = new Taker("motion", "motion-words", "motion-fault", () => show());
-  const choose = async (numbers) => {
+  const choose = async (numbers, azimuth = 0) => {
     looking.look({ playing: false });
-    looking.receive(await ask("motion", { numbers }));
+    looking.receive(await ask("motion", { numbers, azimuth }));
   };
   const take = (files) => taker.work("Sending…", async () => choose(await taker.send(files)));
   const show = () => {
@@ -20,6 +32,11 @@ export function setUpMotions(looking) {
   byId("work-cancel").addEventListener("click", () => taker.work("Going back…", async () => {
     looking.receive(await ask("motion/cancel", {}));
   }));
+  byId("azimuth").addEventListener("change", ({ target }) => {
+    const numbers = [looking.state.motion];
+    const azimuth = Number(target.value); // now: while it is worked on, the present one is shown
+    taker.work("Turning…", () => choose(numbers, azimuth));
+  });
   looking.addEventListener("state", show);
   return take;
 }
@@ -37,8 +54,17 @@ function showMotions({ state }, { busy, words }, choose) {
     tile.disabled = Boolean(busy);
   }
   byId("add-motion").disabled = Boolean(busy);
+  showAzimuth(state, Boolean(busy));
   words.hidden = !busy;
   setText(words, busy ?? "");
+}
+
+function showAzimuth({ azimuth, can_turn: canTurn }, busy) {
+  byId("azimuth-field").hidden = !canTurn && !azimuth;
+  byId("azimuth").disabled = busy;
+  const listed = VIEWS.map(([value]) => value);
+  const words = { [azimuth]: `${azimuth}°`, ...Object.fromEntries(VIEWS) };
+  fill(byId("azimuth"), listed, String(azimuth), words);
 }
 
 function motionTile({ number, name }, choose) {

@@ -4,6 +4,8 @@ import { byId, make, plural, setText, timeLeft, toRanges } from "./dom.js";
 
 const WORK = {
   estimate: "Finding the person in the pictures",
+  track: "Finding the person in the pictures",
+  draw: "Drawing the motion from there",
   scan: "Looking at every frame",
   source: "Reading the photo",
 };

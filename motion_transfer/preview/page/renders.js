@@ -5,7 +5,7 @@ import { post } from "./server.js";
 
 const PICTURES = [".gif", ".png", ".webp", ".apng"];
 const FILMS = [".mp4", ".mov", ".webm", ".mkv"];
-const LOOKED = { scan: " looked at", estimate: " searched for the person" };
+const LOOKED = { scan: " looked at", estimate: " searched for the person", track: " searched for the person" };
 
 export function setUpRenders(looking) {
   byId("cinema-close").addEventListener("click", () => byId("cinema").close());

@@ -89,6 +89,11 @@ class RenderOptions(OutputOptions, SceneOptions, RendererOptions, InputOptions):
             raise InputError(f"workers is {self.workers}; it must be at least 1")
         if self.partners and self.adapt:
             raise InputError("--adapt learns one person; leave it out, or the partners")
+        if self.azimuth is not None and (self.partners or self.background == "driver"):
+            raise InputError(
+                "--azimuth sees one person from elsewhere, and nothing around it; leave it out, or"
+                " --partner and --background driver"
+            )
         if self.size == "crop" and (self.partners or self.place or self.on_the_spot):
             raise InputError(
                 "--size crop is the square around one person; leave it out to place somebody, or"

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from motion_transfer.devices import check_device
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.opening import ESTIMATORS, check_estimator
+from motion_transfer.estimate.opening import ESTIMATORS, check_estimator, landmark_estimators
 from motion_transfer.media.iuv.formats import (
     CHANNEL_ORDERS,
     DRIVER_KINDS,
@@ -43,7 +43,8 @@ class EstimatorOptions(Part):
     estimator: str = option(
         "--estimator",
         "Raw pictures",
-        "blazepose (default; needs `mt models fetch`, once), or densepose, with its model.",
+        "blazepose (default; needs `mt models fetch`, once), blazepose-heavy (nearer, slower;"
+        " `mt models fetch --heavy`), or densepose, with its model.",
         default="blazepose",
         choices=tuple(ESTIMATORS),
     )
@@ -266,7 +267,8 @@ class DriverOptions(EstimatorOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class InputOptions(DriverOptions, SourceOptions):
-    """Everything that goes in: a driver may be fitted to the source's body."""
+    """Everything that goes in: a driver of raw pictures may be fitted to the source's body, or seen
+    from elsewhere, `azimuth` degrees towards its left hand."""
 
     fit_body: bool = option(
         "--fit-body",
@@ -275,8 +277,17 @@ class InputOptions(DriverOptions, SourceOptions):
         kind="flag",
         default=False,
     )
+    azimuth: float | None = option(
+        "--azimuth",
+        "Raw pictures",
+        "See the driver from elsewhere, so many degrees towards its left hand: a body fitted to it"
+        " moves in its place (-360..360; extra `people`).",
+        kind="number",
+        metavar="DEGREES",
+    )
 
     def __post_init__(self) -> None:
+        """Raises: InputError for options that do not go together."""
         super().__post_init__()
         check_estimator(
             self.estimator,
@@ -284,6 +295,19 @@ class InputOptions(DriverOptions, SourceOptions):
             model_flag="--estimator-model",
             fit=self.fit_body,
         )
+        if self.azimuth is None:
+            return
+        if not -360 <= self.azimuth <= 360:
+            raise InputError(f"--azimuth {self.azimuth:g}; it must lie in -360..360 degrees")
+        if self.fit_body:
+            raise InputError(
+                "--azimuth draws a body of its own, which --fit-body does not change; leave one out"
+            )
+        if self.estimator not in landmark_estimators():
+            raise InputError(
+                f"--azimuth follows landmarks, and the {self.estimator} estimator gives none;"
+                f" choose {' or '.join(landmark_estimators())}"
+            )
 
 
 def is_kept(source: Path) -> bool:

@@ -22,7 +22,7 @@ from motion_transfer.estimate.blazepose.networks import BodyFeatures, SeenBody
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
 from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
-from motion_transfer.estimate.models import MODEL_FILES, find_model
+from motion_transfer.estimate.models import HEAVY_LANDMARKER, LANDMARKER, find_model, wanted_files
 from motion_transfer.extras import require_extra
 from motion_transfer.media.growing import MakeItem, claim_folder, make_items
 from motion_transfer.media.publish import explain_disk_errors, publish
@@ -49,6 +49,7 @@ class SampleOptions:
         out: The folder to write to; samples that are there stay.
         people: How many; each is photographed `views` times.
         size_px: The side of the square photos.
+        heavy: Whether to see them as blazepose-heavy does.
         assets: Folder of MakeHuman's assets, by which half of the people are free people.
         workers: Processes; None: one for each core.
     """
@@ -59,6 +60,7 @@ class SampleOptions:
     seed: int = 0
     split: Split = "train"
     size_px: int = 256
+    heavy: bool = False
     assets: Path | None = None
     workers: int | None = None
 
@@ -102,7 +104,7 @@ def make_samples(options: SampleOptions, done: Callable[[int], object] = int) ->
         holds something else or cannot be written.
     """
     require_extra("people")  # workers could only say that they broke
-    for file in MODEL_FILES:
+    for file in wanted_files(heavy=options.heavy):
         find_model(file)
     with explain_disk_errors(options.out):
         claim_folder(options.out / SETTINGS_FILE, options.settings, "samples")
@@ -157,7 +159,9 @@ def _open_maker(options: SampleOptions) -> MakeItem:
     people = PeopleStream(
         seed=options.seed, split=options.split, size=(side, side), assets=options.assets
     )
-    return partial(_make, options, people, BodyTracker(most_people=1, smooth=False))
+    landmarker = HEAVY_LANDMARKER if options.heavy else LANDMARKER
+    tracker = BodyTracker(landmarker=landmarker, most_people=1, smooth=False)
+    return partial(_make, options, people, tracker)
 
 
 def _make(options: SampleOptions, people: PeopleStream, tracker: BodyTracker, number: int) -> None:

@@ -25,7 +25,13 @@ MODEL = Path("a.pt")
 @pytest.mark.parametrize(
     ("name", "model", "fit", "plain", "with_options"),
     [
-        ("magic", None, False, "supported are blazepose, densepose", "supported are blazepose"),
+        (
+            "magic",
+            None,
+            False,
+            "supported are blazepose, blazepose-heavy, densepose",
+            "supported are blazepose",
+        ),
         ("densepose", None, False, "needs its model: a TorchScript", "needs --model FILE; none"),
         ("blazepose", MODEL, False, "choose the densepose", "--model is for the densepose"),
         ("densepose", MODEL, True, "gives no landmarks", "gives none; choose the blazepose"),

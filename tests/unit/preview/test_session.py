@@ -380,6 +380,40 @@ def test_another_motion_takes_the_place_of_the_first(
     assert describe(session)["driver"]["frame_count"] == COUNT
 
 
+def test_a_motion_is_seen_from_elsewhere(options, open_session, body_model) -> None:
+    session = open_session(replace(options, renderer="texture"))
+    session.wait_for_plan()
+    assert describe(session)["can_turn"] is False  # IUV is what one camera saw
+    walk = session.know_motion(Path("people:walk"))
+    for azimuth in (0.0, 90.0):
+        session.choose_motion([walk], azimuth)
+        session.wait_for_plan()
+    state = describe(session)
+    assert (state["motion"], state["azimuth"], state["can_turn"]) == (walk, 90.0, True)
+    assert session.options.driver == Path("people:walk,azimuth=90")
+    iuv = picture(session.ask_frame(0, "iuv", session.key).result())
+    session.cancel_motion()
+    session.wait_for_plan()
+    assert session.options.driver == Path("people:walk")
+    assert (iuv != picture(session.ask_frame(0, "iuv", session.key).result())).any()
+
+
+def test_a_clip_of_pictures_is_seen_by_a_body_that_is_fitted_to_it(
+    options, open_session, studio, tmp_path: Path
+) -> None:
+    session = open_session(options)
+    session.wait_for_plan()
+    iuv = session.motion
+    session.choose_motion([iuv], 45.0)
+    with pytest.raises(InputError, match="--azimuth fits a body to pictures"):
+        session.wait_for_plan()
+    clip = session.know_motion(studio.image("clip/0.png", np.full((40, 40, 3), 90, np.uint8)))
+    session.choose_motion([clip], 45.0)
+    assert (session.options.azimuth, session.azimuth) == (45.0, 45.0)
+    session.choose_motion([iuv])
+    assert (session.options.azimuth, session.azimuth) == (None, 0.0)
+
+
 def test_frames_that_are_sent_together_are_one_motion(options, open_session) -> None:
     session = open_session(options)
     numbers = []

@@ -167,9 +167,10 @@ def test_an_output_that_is_there_stays(tmp_path: Path) -> None:
         ({"output": Path("a.fbx")}, r"a motion is a \.bvh file"),
         ({"person": "all"}, "one person's"),
         ({"person": "tallest"}, "tallest"),
+        ({"estimator": "densepose"}, "give landmarks are blazepose and blazepose-heavy"),
     ],
 )
 def test_wrong_options_are_refused(wrong: dict, message: str) -> None:
-    right = {"source": Path("clip.mp4"), "output": Path("a.bvh")}
+    right: dict = {"source": Path("clip.mp4"), "output": Path("a.bvh")}
     with pytest.raises((InputError, OutputError), match=message):
         TrackOptions(**(right | wrong))

@@ -24,7 +24,11 @@ VIEW = View(CAMERA.focal_px, (CAMERA.width / 2, CAMERA.height / 2))
 RATE = 30
 
 
-def noisy(marks: list[Landmarks | None]) -> list[Landmarks | None]:
+def marks_of(name: str, count: int) -> list[Landmarks]:
+    return [one for one in clip(name, count)[2] if one is not None]
+
+
+def noisy(marks: list[Landmarks]) -> list[Landmarks]:
     """Landmarks that tremble slowly, as BlazePose's do, most of all in their metres."""
     rng, out = np.random.default_rng(0), []
     height = np.ptp(marks[0].image[:, 1])
@@ -37,11 +41,11 @@ def noisy(marks: list[Landmarks | None]) -> list[Landmarks | None]:
     return out
 
 
-def feet_of(marks: list[Landmarks | None]) -> np.ndarray:
+def feet_of(marks: list[Landmarks]) -> np.ndarray:
     """Where heels and balls of the fitted feet are, N x 4 x 3."""
     model = load_body_model()
     puppet = Puppet(model.template, model)
-    postures, _ = fit_postures(puppet, observe(marks), VIEW, RATE)
+    postures, _ = fit_postures(puppet, observe([*marks]), VIEW, RATE)
     return puppet.place(postures).landmarks[:, FEET]
 
 
@@ -50,7 +54,7 @@ def speed(feet: np.ndarray) -> float:
 
 
 def test_feet_that_stand_do_not_slide(monkeypatch: pytest.MonkeyPatch) -> None:
-    marks = noisy(clip("wave", 60)[2])
+    marks = noisy(marks_of("wave", 60))
     pinned = speed(feet_of(marks))
     monkeypatch.setattr(fitting, "find_standing", lambda *_: [])
     free = speed(feet_of(marks))
@@ -59,11 +63,11 @@ def test_feet_that_stand_do_not_slide(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_feet_that_walk_on_the_spot_do_not_stand() -> None:
-    _, bodies, marks = clip("walk", 40)
-    observed = observe(marks)
+    marks = marks_of("walk", 40)
+    observed = observe([*marks])
     points = np.stack([mark.world for mark in marks]).astype(float)
     standing = find_standing(observed.image, observed.weight, points, 300.0, RATE)
-    assert sum(len(one.frames) for one in standing) < 0.1 * 4 * len(bodies)
+    assert sum(len(one.frames) for one in standing) < 0.1 * 4 * len(marks)
 
 
 def path(*stretches: tuple[int, float]) -> np.ndarray:

@@ -85,7 +85,7 @@ def test_real_photos(models, mediapipe_results, samples: Path, name: str) -> Non
 def test_a_clip_is_followed_as_mediapipe_does(models, mediapipe_results) -> None:
     entry = mediapipe_results["astronaut-clip"]
     photo = data.astronaut()
-    tracker = BodyTracker(most_people=1, smooth=False, second_looks=0, steady=0)
+    tracker = BodyTracker(most_people=1, smooth=False, mirror=False, second_looks=0, steady=0)
     height = photo.shape[0] - max(y for _, y in entry["shifts"])
     width = photo.shape[1] - max(x for x, _ in entry["shifts"])
     # each frame's region hangs on the last one's points, and only half of him is in the picture:
