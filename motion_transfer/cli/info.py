@@ -141,9 +141,11 @@ def fetch(archive: Path | None, heavy: bool, faces: bool, force: bool, quiet: bo
     from motion_transfer.estimate.fetching import fetch_models, missing_models
     from motion_transfer.estimate.models import models_folder
 
+    written: list[Path] = []
     missing = missing_models(faces=faces, heavy=heavy, force=force)
-    with long_wait("fetching the models", quiet=quiet or not missing):
-        written = fetch_models(faces=faces, heavy=heavy, archive=archive, force=force)
+    if missing or archive:  # a package that holds nothing of what is asked for is refused
+        with long_wait("fetching the models", quiet=quiet or not missing):
+            written = fetch_models(faces=faces, heavy=heavy, archive=archive, force=force)
     if not quiet:
         what = ", ".join(path.name for path in written) or "everything was there"
         click.echo(f"{models_folder()}: {what}")

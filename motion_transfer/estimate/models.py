@@ -139,6 +139,11 @@ def wanted_files(*, faces: bool = False, heavy: bool = False) -> tuple[ModelFile
     return (*MODEL_FILES, *(FACE_FILES if faces else ()), *(HEAVY_FILES if heavy else ()))
 
 
+def choose_landmarker(*, heavy: bool) -> ModelFile:
+    """Choose one of BlazePose's two landmark models."""
+    return HEAVY_LANDMARKER if heavy else LANDMARKER
+
+
 def models_folder() -> Path:
     """Name the folder of the files: `models` in the cache, see `cache_folder`."""
     return cache_folder() / "models"

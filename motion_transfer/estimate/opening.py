@@ -84,10 +84,10 @@ def check_estimator(
             else f"the {name} estimator has its own models and does not use {model}; leave it out,"
             f" or choose the {other} estimator"
         )
-    if fit and "fit" not in ESTIMATORS[name].takes:
+    if fit and name not in landmark_estimators():
         raise InputError(
             f"--fit-body compares landmarks, and the {name} estimator gives none; choose the"
-            f" {' or '.join(_names_of('fit'))} estimator, or leave out --fit-body"
+            f" {' or '.join(landmark_estimators())} estimator, or leave out --fit-body"
             if model_flag
             else f"the {name} estimator gives no landmarks, so no body can be fitted"
         )

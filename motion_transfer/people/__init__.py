@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         MotionDriver,
         MotionOptions,
         check_motion,
+        hold_motion,
         open_motion,
         record_motion,
     )
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
         is_cached,
         load_body_model,
     )
-    from motion_transfer.people.figure.camera import Camera, frame_points
+    from motion_transfer.people.figure.camera import Camera
     from motion_transfer.people.figure.charts import load_charts, render_iuv
     from motion_transfer.people.figure.mesh import PosedBody
     from motion_transfer.people.figure.rasterise import Triangles, depths, rasterise
@@ -70,7 +71,7 @@ __all__ = [
     "FreePerson", "IuvNoise", "Leg", "MotionDriver", "MotionOptions", "PeopleDataset",
     "PeopleStream", "Person", "PersonPhoto", "Pose", "PosedBody", "Rest", "Shape", "Shot", "Split",
     "Triangles", "are_helpers_cached", "arm_bones", "arm_chain", "check_motion", "check_share",
-    "depths", "find_assets", "finger_bones", "frame_points", "is_cached", "is_motion", "leg_bones",
+    "depths", "find_assets", "finger_bones", "hold_motion", "is_cached", "is_motion", "leg_bones",
     "leg_chain", "load_assets", "load_body_model", "load_charts", "load_helpers", "mirrored_matrix",
     "open_motion", "rasterise", "record_motion", "render_iuv", "rotation", "sample_person",
     "sample_pose", "sample_shot", "turned", "whole_body", "write_album", "write_bvh",
@@ -79,9 +80,9 @@ __all__ = [
 _NAMES_OF = {
     "album": "AlbumOptions write_album",
     "dataset": "PeopleDataset PeopleStream Split",
-    "driver": "MotionDriver MotionOptions check_motion open_motion record_motion",
+    "driver": "MotionDriver MotionOptions check_motion hold_motion open_motion record_motion",
     "figure.body": "FIRST_USE Body BodyModel Shape is_cached load_body_model",
-    "figure.camera": "Camera frame_points",
+    "figure.camera": "Camera",
     "figure.charts": "load_charts render_iuv",
     "figure.mesh": "PosedBody",
     "figure.rasterise": "Triangles depths rasterise",

@@ -24,9 +24,16 @@ from motion_transfer.media.iuv.stream import IuvStream, Raw
 from motion_transfer.media.iuv.writing import IuvOutput, write_iuv
 from motion_transfer.media.publish import check_destination
 from motion_transfer.option import parse_rate, parse_size, read_whole
-from motion_transfer.people.figure.body import Body, BodyModel, Shape, load_body_model
+from motion_transfer.people.figure.body import (
+    Body,
+    BodyModel,
+    Points,
+    Shape,
+    load_body_model,
+)
 from motion_transfer.people.figure.camera import (
     FRAMINGS,
+    Camera,
     Framing,
     check_size,
     frame_points,
@@ -129,11 +136,9 @@ class MotionDriver:
         find = _named_motion if options.motion in MOTIONS else _captured_motion
         self.frame_count, self._posed = find(options, body, self._model)
         above = body.points[:, 2] >= lowest_in(body.heads, body.skeleton, options.framing)
-        index = np.flatnonzero(above)[::CAMERA_STEP]
-        instants = np.linspace(0, self.frame_count - 1, min(CAMERA_POSES, self.frame_count))
-        seen = [self._posed(round(instant)).points[index] for instant in instants]
-        self.camera = frame_points(
-            np.concatenate(seen),
+        self.camera = hold_motion(
+            lambda frame: self._posed(frame).points[above],
+            range(self.frame_count),
             options.size,
             distance=options.distance,
             azimuth=math.radians(options.azimuth),
@@ -144,6 +149,28 @@ class MotionDriver:
         """Draw one frame, (I, U, V)."""
         points = self._posed(index).points
         return render_iuv(points, self._model.faces, self._charts, self.camera)
+
+
+def hold_motion(
+    points_at: Callable[[int], Points],
+    frames: range,
+    size: tuple[int, int],
+    *,
+    distance: float,
+    azimuth: float,
+    elevation: float,
+) -> Camera:
+    """Point a camera, once, so that it holds a whole motion.
+
+    Args:
+        points_at: Frame number -> the vertices that have to be seen.
+        size, distance, azimuth, elevation: See `frame_points`.
+    """
+    instants = np.linspace(frames[0], frames[-1], min(CAMERA_POSES, len(frames)))
+    seen = [points_at(round(instant))[::CAMERA_STEP] for instant in instants]
+    return frame_points(
+        np.concatenate(seen), size, distance=distance, azimuth=azimuth, elevation=elevation
+    )
 
 
 def check_motion(name: str) -> None:

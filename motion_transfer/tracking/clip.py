@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, UInt8
@@ -23,7 +24,7 @@ from motion_transfer.people import (
     Bones,
     Camera,
     Shape,
-    frame_points,
+    hold_motion,
     load_body_model,
     load_charts,
     render_iuv,
@@ -44,8 +45,6 @@ TILT_SHARE = 0.6
 """How much of the body's mean lean towards the camera or away is taken for the camera's tilt."""
 
 CAMERA_METRES = 4.0  # of a camera that sees the motion from elsewhere, from its middle
-CAMERA_POSES, CAMERA_STEP = 48, 8
-"""Of a shot, instants that such a camera is made to hold, and one in so many vertices."""
 
 ON_FLOOR = 0.05
 """Share of the frames in which the lower foot may dip below the floor."""
@@ -123,10 +122,9 @@ class Track:
         """
         model, charts = load_body_model(), load_charts()
         for shot in self.shots:
-            instants = np.linspace(shot.frames[0], shot.frames[-1], CAMERA_POSES).round()
-            poses = [self.points(int(frame), model)[::CAMERA_STEP] for frame in set(instants)]
-            camera = frame_points(
-                np.concatenate(poses),
+            camera = hold_motion(
+                partial(self.points, model=model),
+                shot.frames,
                 (shot.camera.width, shot.camera.height),
                 distance=CAMERA_METRES,
                 azimuth=np.radians(azimuth),

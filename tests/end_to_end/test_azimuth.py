@@ -11,13 +11,11 @@ import pytest
 
 pytest.importorskip("anny")
 
-from tracking_clips import CAMERA, clip
+from tracking_clips import CAMERA, Known, clip
 
 from motion_transfer import RenderOptions
 from motion_transfer.batch.active import scan_name
-from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError
-from motion_transfer.estimate.interface import PersonEstimate
 from motion_transfer.events import Notice, Stage, ignore
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.pictures.photo import write_png
@@ -31,21 +29,10 @@ COUNT = 16
 LEFT_HEAD, RIGHT_HEAD = 24, 23
 
 
-class Walker:
+def walker_unseen_in(unseen: range) -> Known:
     """An estimator that sees somebody walk, whatever the frames show; nobody in some of them."""
-
-    def __init__(self, unseen: range = range(0)) -> None:
-        self._marks, self._unseen, self._index = clip("walk", COUNT)[2], unseen, -1
-
-    def start_shot(self) -> None:
-        pass
-
-    def estimate(self, frame: np.ndarray) -> list[PersonEstimate]:
-        self._index += 1
-        if self._index in self._unseen:
-            return []
-        iuv, alpha = np.ones((4, 4, 3), np.uint8), np.full((4, 4), 255, np.uint8)
-        return [PersonEstimate(0, Box(0, 0, 4, 4), iuv, alpha, 1.0, self._marks[self._index])]
+    marks = clip("walk", COUNT)[2]
+    return Known([None if index in unseen else one for index, one in enumerate(marks)])
 
 
 @pytest.fixture
@@ -59,10 +46,12 @@ def dance(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def walker(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Lets whoever opens an estimator for a driver get a `Walker`."""
+    """Lets whoever opens an estimator for a driver get one that walks."""
 
     def choose(unseen: range = range(0)) -> None:
-        monkeypatch.setattr(picture_driver, "open_estimator", lambda *_, **__: Walker(unseen))
+        monkeypatch.setattr(
+            picture_driver, "open_estimator", lambda *_, **__: walker_unseen_in(unseen)
+        )
 
     choose()
     return choose

@@ -32,8 +32,7 @@ from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.estimate.iuv.weights import find_shipped, shipped_file
 from motion_transfer.estimate.models import (
     DETECTOR,
-    HEAVY_LANDMARKER,
-    LANDMARKER,
+    choose_landmarker,
     digest,
     find_model,
     wanted_files,
@@ -76,16 +75,16 @@ class BlazePoseEstimator:
         for_photos: bool = False,
     ) -> None:
         with ThreadPoolExecutor() as threads:  # each takes a quarter of a second
-            landmarker = HEAVY_LANDMARKER if heavy else LANDMARKER
+            landmarker = find_model(choose_landmarker(heavy=heavy))
             painter = partial(_open_painter, weights) if weights else partial(_open_shipped, heavy)
             network = threads.submit(painter)
             detector = threads.submit(PersonDetector, find_model(DETECTOR))
-            threads.submit(LandmarkModel, find_model(landmarker)).result()
+            threads.submit(LandmarkModel, landmarker).result()
             detector.result()  # the tracker finds them open
         self._network = network.result()
         smooth = smooth and not for_photos
         self._tracker = BodyTracker(
-            landmarker=landmarker,
+            heavy=heavy,
             most_people=most_people,
             smooth=smooth,
             frame_rate=frame_rate,

@@ -16,7 +16,7 @@ from jaxtyping import UInt8
 from motion_transfer.estimate.blazepose.networks import LandmarkModel, PersonDetector, SeenBody
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.interface import mean_landmarks
-from motion_transfer.estimate.models import DETECTOR, LANDMARKER, ModelFile, find_model
+from motion_transfer.estimate.models import DETECTOR, choose_landmarker, find_model
 
 NEWCOMERS_EVERY = 12  # frames between two searches while everybody is in sight
 LEAST_NEWCOMER = 0.75  # presence from which somebody is followed; ghosts have less
@@ -54,7 +54,7 @@ class BodyTracker:
     """People and their landmarks, frame after frame; one object serves one thread.
 
     Args:
-        landmarker: The landmark model's file.
+        heavy: Whether to look with the large landmark model.
         most_people: How many are followed at once; the most certain ones.
         smooth: Whether to smooth the landmarks between frames.
         frame_rate: Frames per second, for smoothing.
@@ -69,7 +69,7 @@ class BodyTracker:
     def __init__(
         self,
         *,
-        landmarker: ModelFile = LANDMARKER,
+        heavy: bool = False,
         most_people: int = 4,
         smooth: bool = True,
         frame_rate: float = 30.0,
@@ -78,7 +78,7 @@ class BodyTracker:
         steady: float = STEADY,
     ) -> None:
         self._detector = PersonDetector(find_model(DETECTOR))
-        self._landmarker = LandmarkModel(find_model(landmarker))
+        self._landmarker = LandmarkModel(find_model(choose_landmarker(heavy=heavy)))
         self._most_people, self._smooth = most_people, smooth
         self._mirror, self._second_looks, self._steady = mirror, second_looks, steady
         self._seconds = 1 / frame_rate

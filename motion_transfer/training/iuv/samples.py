@@ -22,7 +22,7 @@ from motion_transfer.estimate.blazepose.networks import BodyFeatures, SeenBody
 from motion_transfer.estimate.blazepose.region import Region
 from motion_transfer.estimate.blazepose.tracker import BodyTracker
 from motion_transfer.estimate.interface import LANDMARK_COUNT, Landmarks
-from motion_transfer.estimate.models import HEAVY_LANDMARKER, LANDMARKER, find_model, wanted_files
+from motion_transfer.estimate.models import find_model, wanted_files
 from motion_transfer.extras import require_extra
 from motion_transfer.media.growing import MakeItem, claim_folder, make_items
 from motion_transfer.media.publish import explain_disk_errors, publish
@@ -159,8 +159,7 @@ def _open_maker(options: SampleOptions) -> MakeItem:
     people = PeopleStream(
         seed=options.seed, split=options.split, size=(side, side), assets=options.assets
     )
-    landmarker = HEAVY_LANDMARKER if options.heavy else LANDMARKER
-    tracker = BodyTracker(landmarker=landmarker, most_people=1, smooth=False)
+    tracker = BodyTracker(heavy=options.heavy, most_people=1, smooth=False)
     return partial(_make, options, people, tracker)
 
 

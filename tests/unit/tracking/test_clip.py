@@ -10,11 +10,10 @@ import pytest
 
 pytest.importorskip("anny")
 
-from tracking_clips import CAMERA, clip
+from tracking_clips import CAMERA, Known, clip
 
-from motion_transfer.drawing.person import Box
 from motion_transfer.errors import InputError, OutputError
-from motion_transfer.estimate.interface import Landmarks, PersonEstimate
+from motion_transfer.estimate.interface import Landmarks
 from motion_transfer.media.pictures.photo import write_png
 from motion_transfer.people.driver import MotionDriver, MotionOptions
 from motion_transfer.people.figure.body import load_body_model
@@ -26,22 +25,6 @@ from motion_transfer.tracking.puppet import Puppet
 
 SIZE = (CAMERA.width, CAMERA.height)
 RATE = Fraction(30)
-
-
-class Known:
-    """An estimator that says what it was told to, frame after frame."""
-
-    def __init__(self, marks: list[Landmarks | None]) -> None:
-        self._marks = iter(marks)
-
-    def start_shot(self) -> None:
-        pass
-
-    def estimate(self, frame: np.ndarray) -> list[PersonEstimate]:
-        marks = next(self._marks)
-        iuv, alpha = np.ones((4, 4, 3), np.uint8), np.full((4, 4), 255, np.uint8)
-        one = PersonEstimate(0, Box(0, 0, 4, 4), iuv, alpha, 1.0, marks)
-        return [one] if marks is not None else []
 
 
 def fit(marks: list[Landmarks | None], starts: list[int] | None = None) -> Track:
