@@ -49,7 +49,7 @@ class Render:
 
     def told(self) -> dict[str, Any]:
         """Tell it in words and numbers, for JSON."""
-        output = self.options.output
+        output, done = self.options.output, self.status == "done"
         return {
             "number": self.number,
             "name": output.name,
@@ -57,7 +57,8 @@ class Render:
             "status": self.status,
             "message": self.message,
             "seconds": self.seconds,
-            "bytes": _size(output) if self.status == "done" else None,
+            "bytes": _size(output) if done else None,
+            "gone": done and not output.exists(),
             **(self.progress or Progress("", 0, 0)).told(),
         }
 

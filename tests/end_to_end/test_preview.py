@@ -212,6 +212,14 @@ def press(page: Any, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).click()
 
 
+def forget_renders(page: Any, preview: Preview) -> None:
+    """Begin without a result: what another test rendered is neither on the page nor on the disk."""
+    for button in page.get_by_role("button", name="Forget out.webm").all():
+        button.click()
+    expect(page.locator("#renders li")).to_have_count(0)
+    (preview.folder / "out.webm").unlink(missing_ok=True)
+
+
 def drop(page: Any, target: str, *paths: Path) -> None:
     """Drop files on one of the places that the page shows while they are dragged over it."""
     files = [(path.name, base64.b64encode(path.read_bytes()).decode()) for path in paths]
@@ -354,7 +362,7 @@ def test_a_motion_is_chosen_by_its_picture(page) -> None:
 
 def test_all_three_are_seen_and_written_side_by_side(page, preview) -> None:
     """What the view shows is what the file holds: the photo, the IUV, the result."""
-    (preview.folder / "out.webm").unlink(missing_ok=True)
+    forget_renders(page, preview)
     assert preview.post("options", {"frames": [0, 2]}) == 200
     press(page, "Side by side")
     shows(page, 0, "beside")
@@ -518,7 +526,7 @@ def test_a_window_that_cannot_be_is_given_back_and_not_rendered(page) -> None:
 
 
 def test_the_video_is_rendered_and_plays(page, preview) -> None:
-    (preview.folder / "out.webm").unlink(missing_ok=True)
+    forget_renders(page, preview)
     assert preview.post("options", {"frames": [0, 30]}) == 200
     expect(page.locator("#length")).to_contain_text("30 frames")
     press(page, "Render")
@@ -533,6 +541,10 @@ def test_the_video_is_rendered_and_plays(page, preview) -> None:
     expect(page.locator("#renders li")).to_contain_text("Done in")
     with av.open(str(preview.folder / "out.webm")) as container:
         assert sum(1 for _ in container.decode(video=0)) == 30
+    (preview.folder / "out.webm").unlink()
+    assert preview.post("options", UNTOUCHED) == 200
+    expect(page.locator("#renders li")).to_contain_text("no longer there")
+    expect(page.get_by_role("button", name="Watch out.webm")).to_have_count(0)
 
 
 def test_an_output_is_replaced_only_if_somebody_says_so(page, preview) -> None:
@@ -546,7 +558,7 @@ def test_an_output_is_replaced_only_if_somebody_says_so(page, preview) -> None:
 
 
 def test_a_run_is_stopped(page, preview) -> None:
-    (preview.folder / "out.webm").unlink(missing_ok=True)
+    forget_renders(page, preview)
     assert preview.post("options", {"renderer": "nhrr"}) == 200
     expect(page.get_by_label("Renderer")).to_have_value("nhrr")
     press(page, "Render")
@@ -559,7 +571,7 @@ def test_a_run_is_stopped(page, preview) -> None:
 
 
 def test_a_saved_job_is_what_a_batch_runs(page, preview, mt) -> None:
-    (preview.folder / "out.webm").unlink(missing_ok=True)
+    forget_renders(page, preview)
     (preview.folder / "preview.yaml").unlink(missing_ok=True)
     assert preview.post("options", {"frames": [5, 9], "background": "black"}) == 200
     expect(page.locator("#length")).to_contain_text("4 frames")

@@ -91,7 +91,7 @@ function showItem(item, render) {
   words.classList.toggle("fault", status === "failed");
   setText(words, wordsOf(render));
   const shown = {
-    watch: status === "done" && (isFilm(name) || isPicture(name)),
+    watch: status === "done" && !render.gone && (isFilm(name) || isPicture(name)),
     download: status === "done" && render.bytes != null,
     stop: status === "running" || status === "waiting",
     resume: status === "stopped" || status === "failed",
@@ -107,14 +107,14 @@ function showItem(item, render) {
 }
 
 function wordsOf(render) {
-  const { status, stage, done, total, message, seconds, bytes } = render;
+  const { status, stage, done, total, message, seconds, bytes, gone } = render;
   const time = seconds == null ? "" : ` in ${seconds.toFixed(1)} s`;
   const size = bytes == null ? "" : `, ${sizeOf(bytes)}`;
   const frames = total ? `${done} of ${plural(total, "frame")}${LOOKED[stage] ?? ""}` : "Beginning…";
   return {
     waiting: "Waits for its turn.",
     running: `${frames}${timeLeft(render)}`,
-    done: `Done${time}${size}. ${message}`.trim(),
+    done: `Done${time}${size}. ${gone ? "The file is no longer there." : message}`.trim(),
     failed: message || "Rendering failed.",
     stopped: message || "Stopped. Resume to go on where it was.",
   }[status];

@@ -129,6 +129,14 @@ def test_a_run_that_fails_says_why_and_the_next_one_has_its_turn(
     assert ended(queue, working.number).status == "done"
 
 
+def test_a_result_that_somebody_took_away_is_told(options: RenderOptions, open_queue) -> None:
+    queue = open_queue()
+    render = ended(queue, queue.add(replace(options, frames=(0, 4))).number)
+    assert (render.status, render.told()["gone"]) == ("done", False)
+    options.output.rename(options.output.with_name("elsewhere"))
+    assert render.told()["gone"]
+
+
 def test_time_left_is_told_by_what_was_made_now() -> None:
     from motion_transfer.preview.progress import Progress
 
