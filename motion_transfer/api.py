@@ -9,7 +9,7 @@ from typing import Literal
 
 from motion_transfer.events import Listener, ignore
 from motion_transfer.media.iuv.formats import ChannelOrder, DriverKind, Missing
-from motion_transfer.option import parse_frames, parse_rate
+from motion_transfer.option import parse_frames, parse_path, parse_rate
 from motion_transfer.render.memory import AnyPath, list_paths
 from motion_transfer.render.options import Garment, Partner, RenderOptions
 from motion_transfer.render.run import RenderReport, run
@@ -140,7 +140,7 @@ def render_video(
             person=person,
             source_iuv_order=source_iuv_order,
             garments=tuple(garments),
-            driver=Path(driver),
+            driver=parse_path(driver),
             driver_kind=driver_kind,
             driver_person=driver_person,
             iuv_order=iuv_order,
@@ -167,7 +167,7 @@ def render_video(
             engine=engine,
             precision=precision,
             device=device,
-            output=Path(output),
+            output=parse_path(output),
             frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
             codec=codec,
             crf=crf,
@@ -189,4 +189,4 @@ def render_video(
 
 
 def _path(path: AnyPath | None) -> Path | None:
-    return None if path is None else Path(path)
+    return None if path is None else parse_path(path)

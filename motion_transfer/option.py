@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from functools import cache
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -86,6 +87,9 @@ class Option:
 
     def read(self, written: Any) -> Any:
         """The field's value for what was written, None for nothing. Raises: InputError."""
+        several = written if isinstance(written, list | tuple) else [written]
+        if self.kind in ("path", "paths") and "" in several:
+            raise InputError(f"{self.word.replace('_', ' ')}: {EMPTY_PATH}")
         return self.default if written is None else self.parse(written)
 
 
@@ -173,6 +177,7 @@ SCENES = ("photo", "driver", "transparent")
 """Backgrounds that are words, and no colour."""
 
 
+EMPTY_PATH = "a path is empty; name a file or a folder"
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*(::[^/]*)?://")
 
 
@@ -181,10 +186,17 @@ def is_url(text: object) -> bool:
     return _URL.match(str(text)) is not None
 
 
-def parse_path(text: str) -> Path:
-    """Read a path on this machine. Raises: InputError for a URL."""
-    if is_url(text):
+def parse_path(text: str | PathLike[str]) -> Path:
+    """Read a path on this machine. Raises: InputError for a URL, and for nothing."""
+    if is_url(text := fspath(text)):
         raise InputError(f"{text!r} is a URL; only `mt run` and `mt batch run` fetch those")
+    return some_path(text)
+
+
+def some_path(text: str) -> Path:
+    """Take a path, or a URL that is fetched later. Raises: InputError for nothing."""
+    if not text:  # which would be the folder where we are
+        raise InputError(EMPTY_PATH)
     return Path(text)
 
 

@@ -23,7 +23,7 @@ output_option = section("Output")
 )
 @people_option(
     "--assets",
-    type=click.Path(path_type=Path),
+    type=FILE,
     metavar="DIR",
     help="Folder of MakeHuman's assets, which half of them wear; else MT_ASSETS, if it is set.",
 )

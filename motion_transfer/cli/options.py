@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from motion_transfer.errors import InputError, did_you_mean
-from motion_transfer.option import Option, is_url, list_options
+from motion_transfer.option import EMPTY_PATH, Option, is_url, list_options
 
 
 class LocalPath(click.Path):
@@ -25,6 +25,8 @@ class LocalPath(click.Path):
             self.fail(
                 f"{value!r} is a URL; only `mt run` and `mt batch run` fetch those", param, ctx
             )
+        if value == "":
+            self.fail(EMPTY_PATH, param, ctx)
         return super().convert(value, param, ctx)
 
 

@@ -26,7 +26,8 @@ RANDOM_ENDING_BYTES = 16
 
 def name_beside(final: Path, ending: str) -> Path:
     """Name something hidden beside an output, always the same for the same output."""
-    return final.absolute().with_name("." + extend_name(final.name, ending))
+    final = final.absolute() if final.name not in ("", "..") else final.resolve()
+    return final.parent / f".{extend_name(final.name, ending)}"
 
 
 def extend_name(name: str, ending: str) -> str:
@@ -68,6 +69,8 @@ def check_destination(
     with explain_disk_errors(path):
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise OutputError(f"{path} is a device or a pipe; choose the name of a file")
+        if path.is_dir() and Path.cwd().is_relative_to(path.resolve()):
+            raise OutputError(f"{path} is where you are, or holds it; choose another name")
         if path.exists() and not force:
             raise OutputError(f"{path} exists already; choose another name or add --force")
         # a mistyped name is not to cost somebody a folder of other things

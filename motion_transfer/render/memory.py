@@ -28,7 +28,7 @@ from motion_transfer.media.iuv.opening import open_reader
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.pictures.photo import Photo
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import parse_frames, parse_rate
+from motion_transfer.option import parse_frames, parse_path, parse_rate
 from motion_transfer.render.composition import (
     Scene,
     open_canvas,
@@ -344,10 +344,11 @@ class _DriverFrames:
 
 
 def list_paths(paths: AnyPath | Sequence[AnyPath] | None) -> tuple[Path, ...]:
-    """List what is one path, several, or none."""
+    """List what is one path, several, or none. Raises: InputError, see `parse_path`."""
     if paths is None:
         return ()
-    return (Path(paths),) if isinstance(paths, str | PathLike) else tuple(map(Path, paths))
+    several = [paths] if isinstance(paths, str | PathLike) else paths
+    return tuple(map(parse_path, several))
 
 
 def _take_photo(

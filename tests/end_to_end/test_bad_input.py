@@ -237,6 +237,15 @@ USAGE = {
         "no option --sauce; did you mean --source? See `mt run --help`",
     ),
     "unknown command": (["rum"], "no command 'rum'; did you mean run? See `mt --help`"),
+    "a variable that was empty": (
+        ["run", "--source", "", "--driver", "a", "-o", "b.mp4"],
+        "mt: source: a path is empty; name a file or a folder",
+    ),
+    "another one": (["inspect", ""], "a path is empty; name a file or a folder"),
+    "a garment's photo is empty": (
+        [*"run --source a --driver b -o c --garment-parts torso --garment".split(), ""],
+        "a path is empty; name a file or a folder",
+    ),
     "unknown topic": (
         ["info", "hats"],
         "hats does not exist, and is no topic either; those are all and parts",

@@ -202,6 +202,17 @@ def test_a_folder_and_a_video_are_like_their_pictures(
     assert decoded(studio.folder / "out") == decoded(studio.folder / "photos")
 
 
+def test_the_folder_where_we_are_is_a_source(
+    studio, draft: Callable, photos: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver = studio.driver(2)
+    monkeypatch.chdir(in_a_folder(studio))
+    outcome = draft("--source", ".", "--driver", driver, "-o", studio.folder / "out")
+    assert (outcome.code, outcome.err) == (0, "")
+    draw(photos, driver, studio.folder / "photos")
+    assert decoded(studio.folder / "out") == decoded(studio.folder / "photos")
+
+
 def test_a_photo_of_a_folder_that_changes_is_drawn_anew(studio) -> None:
     folder, driver, output = in_a_folder(studio), studio.array(FRAMES), studio.folder / "out.mp4"
     assert interrupted([folder], driver, output)

@@ -16,6 +16,7 @@ from motion_transfer.option import (
     option,
     options_from_words,
     parse_frames,
+    parse_path,
     parse_rate,
     parse_size,
     part_of,
@@ -48,6 +49,13 @@ def test_sections_order_the_described_fields_and_leave_others_out() -> None:
 def test_words_become_values_and_nothing_the_default() -> None:
     made = options_from_words(Whole, {"first": "a.png", "rate": "30000/1001", "colour": None})
     assert made == Whole(first=Path("a.png"), rate=Fraction(30000, 1001), colour="red")
+
+
+def test_an_empty_path_is_not_the_folder_where_we_are() -> None:
+    with pytest.raises(InputError, match=r"^first one: a path is empty; name a file or a folder$"):
+        options_from_words(Whole, {"first": ""})
+    with pytest.raises(InputError, match="a path is empty"):
+        parse_path("")
 
 
 def test_a_value_that_is_none_of_the_choices_is_refused() -> None:

@@ -166,11 +166,12 @@ def list_clip_iuv_names(clip: Path) -> list[Path]:
     """List where the IUV of a video, or of a folder of photos, is looked for, all beside it.
 
     It is `STEM_IUV.mkv` or `STEM_iuv.mkv`, another file that holds the IUV of many frames, or a
-    folder `STEM_IUV` or `STEM_iuv`.
+    folder `STEM_IUV` or `STEM_iuv`. Nothing is looked for beside a folder given as `.` or `/`.
     """
     return [
         clip.with_name(f"{clip.stem}_{word}{suffix}")
         for word in ("IUV", "iuv")
+        if clip.name
         for suffix in (*iuv_suffixes(several=True), "")
     ]
 

@@ -19,7 +19,7 @@ from motion_transfer.media.iuv.formats import (
     Missing,
     driver_help,
 )
-from motion_transfer.option import LONGEST_SHOWN, REQUIRED, option, read_whole
+from motion_transfer.option import LONGEST_SHOWN, REQUIRED, option, read_whole, some_path
 from motion_transfer.render.options.part import Part
 
 KEPT_SUFFIX = ".mtsource"
@@ -318,7 +318,7 @@ def is_kept(source: Path) -> bool:
 def read_garment(written: Mapping[str, str]) -> Garment:
     """Read a garment from a mapping with `photo`, `parts` and perhaps `iuv`. Raises: InputError."""
     return Garment(
-        photo=Path(written["photo"]),
+        photo=some_path(written["photo"]),
         iuv=Path(written["iuv"]) if written.get("iuv") else None,
         parts=parse_parts(written["parts"]),
     )

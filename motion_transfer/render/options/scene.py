@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motion_transfer.errors import InputError
-from motion_transfer.option import LONGEST_SHOWN, option
+from motion_transfer.option import LONGEST_SHOWN, option, some_path
 from motion_transfer.option import parse_background as parse_background
 from motion_transfer.render.options.part import Part
 
@@ -148,9 +148,9 @@ class SceneOptions(Part):
 
 
 def read_partner(written: Mapping[str, str]) -> Partner:
-    """Read a partner from a mapping with `photo`, `person` and perhaps `iuv`."""
+    """Read a partner from a mapping, as `read_garment` does. Raises: InputError."""
     return Partner(
-        photo=Path(written["photo"]),
+        photo=some_path(written["photo"]),
         person=str(written["person"]),
         iuv=Path(written["iuv"]) if written.get("iuv") else None,
     )

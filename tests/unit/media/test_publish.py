@@ -88,6 +88,25 @@ def test_a_folder_of_other_things_is_never_replaced(tmp_path: Path) -> None:
         check_destination(tmp_path / "out", force=True)
 
 
+@pytest.mark.parametrize("name", [".", "..", "../frames", "/"])
+def test_where_we_are_is_never_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(put(tmp_path / "frames", "frame"))
+    with pytest.raises(OutputError, match=r"is where you are, or holds it; choose another name"):
+        check_destination(Path(name), force=True)
+
+
+def test_hidden_names_have_the_name_of_a_folder_that_is_given_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in").mkdir()
+    monkeypatch.chdir(tmp_path / "in")
+    assert name_beside(Path(".."), ".work") == name_beside(tmp_path, ".work")
+    assert name_beside(Path(), ".work") == name_beside(tmp_path / "in", ".work")
+    assert name_beside(Path("/"), ".work").parent == Path("/")
+
+
 def test_a_file_is_no_folder(tmp_path: Path) -> None:
     put(tmp_path / "notes.txt", "")
     with pytest.raises(OutputError, match=r"notes\.txt is not a folder"):
