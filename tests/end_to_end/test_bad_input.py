@@ -228,6 +228,7 @@ def test_bad_input(studio, draft, case: str) -> None:
     assert sorted(studio.folder.rglob("*")) == before
 
 
+SOME = ["--source", "a", "--driver", "b", "-o", "c"]
 USAGE = {
     "no source": (["run", "--driver", "a", "-o", "b.mp4"], "missing option '--source'"),
     "no output": (["run", "--source", "a", "--driver", "b"], "missing option '-o' / '--output'"),
@@ -243,7 +244,7 @@ USAGE = {
     ),
     "another one": (["inspect", ""], "a path is empty; name a file or a folder"),
     "a garment's photo is empty": (
-        [*"run --source a --driver b -o c --garment-parts torso --garment".split(), ""],
+        ["run", "--garment", "", "--garment-parts", "torso", *SOME],
         "a path is empty; name a file or a folder",
     ),
     "unknown topic": (
