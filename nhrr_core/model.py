@@ -110,6 +110,7 @@ class NeuralReRenderer(nn.Module):
 
         With `config.colour_shortcut` the texture may be a multiple of `config.texture_size`:
         FeatureNet works at its own size, and what it adds to the colours is added to the finer.
+        What is hidden is no finer than that: guesses gain nothing by it.
 
         Args:
             visibility: 1 where the texture shows something, else 0.
@@ -162,10 +163,13 @@ class NeuralReRenderer(nn.Module):
         feature_map = self.feature_net(torch.cat(own, dim=1))
         if not self.config.colour_shortcut:
             return feature_map
-        fine = self._filled(texture, visibility) if factor > 1 else own
-        feature_map = enlarge_map(feature_map, factor)
+        carried = own[0][:, :COLOUR_CHANNELS]
+        if factor > 1:
+            feature_map = enlarge_map(feature_map, factor)
+            # smoothly: mirror images and surroundings are coarse, and would show their texels
+            carried = torch.where(visibility > 0, texture, enlarge_map(carried, factor))
         colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
-        return torch.cat([colours + fine[0][:, :COLOUR_CHANNELS], others], dim=1)
+        return torch.cat([colours + carried, others], dim=1)
 
     def _features_like(
         self,

@@ -76,31 +76,33 @@ def _complete(
     """Append what `NeuralReRenderer` does to a texture; returns the learned features."""
     if not config.has_feature_net:
         return texture
-    size = config.finest_texture
-    fine = own = _read_by_feature_net(graph, texture, visibility, config, weights, size)
-    if not config.colour_shortcut:
-        return append_feature_net(graph, graph.join(*own), weights)
-    factor = size // config.texture_size
+    factor = config.finest_texture // config.texture_size
+    coarse, seen = texture, visibility
     if factor > 1:
         pool = {"kernel_shape": [factor, factor], "strides": [factor, factor]}
         share = graph("AveragePool", visibility, **pool)
         mean = graph("AveragePool", texture, **pool)
         coarse = graph("Div", mean, graph("Max", share, 1 / factor**2))
         seen = graph("Cast", graph("Greater", share, 0), to=FLOAT)
-        own = _read_by_feature_net(graph, coarse, seen, config, weights, config.texture_size)
+    own = _read_by_feature_net(graph, coarse, seen, config, weights)
     features = append_feature_net(graph, graph.join(*own), weights)
+    if not config.colour_shortcut:
+        return features
+    carried = own[0]
     if factor > 1:
-        features = enlarge(graph, features, factor)
-    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), fine[0])
+        features, carried = (enlarge(graph, each, factor) for each in (features, carried))
+        carried = graph("Where", graph("Greater", visibility, 0), texture, carried)
+    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), carried)
     if config.feature_outputs == COLOUR_CHANNELS:
         return colours
     return graph.join(colours, graph.part(features, COLOUR_CHANNELS, config.feature_outputs))
 
 
 def _read_by_feature_net(
-    graph: Graph, texture: str, visibility: str, config: ModelConfig, weights: Weights, size: int
+    graph: Graph, texture: str, visibility: str, config: ModelConfig, weights: Weights
 ) -> list[str]:
     """The texture, filled if it is to be, and what is known of it."""
+    size = config.texture_size
     known = [visibility] if config.visibility_input else []
     if config.prefilled:
         texture, shown = fill_holes(graph, texture, visibility, size, COLOUR_CHANNELS)
@@ -108,9 +110,7 @@ def _read_by_feature_net(
     if config.geometry:
         known.append(graph.constant(texel_positions(size)))
     if config.prior:
-        prior = weights["prior"]
-        factor = size // config.texture_size
-        known.append(graph.constant(prior.repeat(factor, 2).repeat(factor, 3)))
+        known.append(graph.constant(weights["prior"]))
     return [texture, *known]
 
 
