@@ -70,6 +70,8 @@ INTERRUPTED = 130  # 128 and the signal's number, as shells have it
 TERMINATED = 143
 UNEXPECTED = 1
 UNUSABLE = 2  # as InputError has it
+GONE = (errno.EIO, errno.ENXIO, errno.ENODEV, errno.ETIMEDOUT, getattr(errno, "ESTALE", errno.EIO))
+"""What the system says where a disk fails, or a drive is no longer there."""
 
 DEBUG = click.Option(
     ["--debug"],
@@ -244,6 +246,11 @@ def _explain(error: Exception) -> tuple[int, list[str]]:
             ]
         case OSError() if error.filename is not None:  # a name that no check has foreseen
             return UNUSABLE, [printable(f"{os.fsdecode(error.filename)}: {error.strerror}")]
+        case OSError() if error.errno in GONE:
+            return UNEXPECTED, [
+                f"a file could not be read or written ({error.strerror}): its disk or network"
+                " fails; see to that, then give the command again"
+            ]
     kind, said = type(error).__name__, printable(next(iter(str(error).splitlines()), ""))
     return UNEXPECTED, [
         f"unexpected {kind}{': ' * bool(said)}{said}; this is a fault of the program: please report"

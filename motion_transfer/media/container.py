@@ -69,7 +69,11 @@ def open_input(path: Path, what: str = "video") -> Iterator[InputContainer]:
             )
         except FFmpegError as error:
             file.seek(0)
-            if file.read(LIST_BYTES).startswith(LISTS):
+            try:
+                beginning = file.read(LIST_BYTES) or b""
+            except OSError as failed:  # a disk that fails, a drive that is gone
+                raise InputError(f"{what} {path} cannot be read: {failed.strerror}") from error
+            if beginning.startswith(LISTS):
                 raise InputError(
                     f"{what} {path} is a list of other files and has no pictures or sound itself;"
                     " name one of those files"

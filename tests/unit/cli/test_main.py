@@ -50,6 +50,7 @@ def failing(monkeypatch: pytest.MonkeyPatch):
         (ImportError("x.so: failed to map segment from shared object"), 1, "mt: the memory is"),
         (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), 1, "mt: the memory is"),
         (OSError(errno.ENOMEM, "Cannot allocate memory", "x"), 1, "mt: the memory is used up"),
+        (OSError(errno.EIO, "Input/output error"), 1, "mt: a file could not be read or written"),
         (KeyError("key"), 1, "mt: unexpected KeyError: 'key'; this is a fault of the program"),
         (RecursionError(), 1, "mt: unexpected RecursionError; this is a fault of the program"),
         (ValueError("one\ntwo"), 1, "mt: unexpected ValueError: one; this"),

@@ -67,6 +67,16 @@ LISTS = {
 }
 
 
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="needs a file that fails to read")
+def test_a_disk_that_fails_is_told_with_the_name_of_the_file() -> None:
+    fails = Path("/proc/self/mem")
+    with (
+        pytest.raises(InputError, match=r"driver /proc/self/mem cannot be read: Input/output"),
+        open_input(fails, "driver"),
+    ):
+        pass
+
+
 @pytest.mark.parametrize("name", LISTS)
 def test_a_list_of_other_files_opens_none_of_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, capfd: pytest.CaptureFixture[str]
