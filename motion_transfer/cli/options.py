@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from motion_transfer.errors import InputError, did_you_mean
-from motion_transfer.option import EMPTY_PATH, Option, is_url, list_options
+from motion_transfer.option import Option, list_options, parse_path
 
 
 class LocalPath(click.Path):
@@ -21,13 +21,10 @@ class LocalPath(click.Path):
         super().__init__(path_type=Path)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if is_url(value):
-            self.fail(
-                f"{value!r} is a URL; only `mt run` and `mt batch run` fetch those", param, ctx
-            )
-        if value == "":
-            self.fail(EMPTY_PATH, param, ctx)
-        return super().convert(value, param, ctx)
+        try:
+            return parse_path(value)
+        except InputError as error:
+            self.fail(str(error), param, ctx)
 
 
 FILE = LocalPath()
