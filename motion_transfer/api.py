@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from pathlib import Path
 from typing import Literal
 
 from motion_transfer.events import Listener, ignore
 from motion_transfer.media.iuv.formats import ChannelOrder, DriverKind, Missing
 from motion_transfer.option import parse_frames, parse_path, parse_rate
-from motion_transfer.render.memory import AnyPath, list_paths
+from motion_transfer.render.memory import AnyPath, list_paths, read_path
 from motion_transfer.render.options import Garment, Partner, RenderOptions
 from motion_transfer.render.run import RenderReport, run
 
@@ -148,11 +147,11 @@ def render_video(
             window=window,
             frames=parse_frames(frames) if isinstance(frames, str) else frames or (None, None),
             estimator=estimator,
-            estimator_model=_path(estimator_model),
+            estimator_model=read_path(estimator_model),
             fit_body=fit_body,
             azimuth=azimuth,
             renderer=renderer,
-            weights=_path(weights),
+            weights=read_path(weights),
             background=str(background),
             background_fit=background_fit,
             background_end=background_end,
@@ -173,20 +172,16 @@ def render_video(
             crf=crf,
             pix_fmt=pix_fmt,
             alpha=alpha,
-            audio=_path(audio),
+            audio=read_path(audio),
             audio_track=audio_track,
             size=size,
             compare=compare,
-            sheet=_path(sheet),
+            sheet=read_path(sheet),
             provenance=provenance,
-            credentials_cert=_path(credentials_cert),
-            credentials_key=_path(credentials_key),
+            credentials_cert=read_path(credentials_cert),
+            credentials_key=read_path(credentials_key),
             force=force,
             restart=restart,
         ),
         listener,
     )
-
-
-def _path(path: AnyPath | None) -> Path | None:
-    return None if path is None else parse_path(path)

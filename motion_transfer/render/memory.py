@@ -100,7 +100,7 @@ class MotionTransfer:
         """Take the options of `render_video`. Raises: InputError, WeightsError."""
         self._options = RendererOptions(
             renderer=renderer,
-            weights=None if weights is None else Path(weights),
+            weights=read_path(weights),
             engine=engine,
             precision=precision,
             device=device,
@@ -138,7 +138,7 @@ class MotionTransfer:
         files = self._options.weights_files
         if not files:
             raise InputError(f"the {self.recipe.name} renderer has no weights to save")
-        save_pretrained(files[0], Path(folder), push=push)
+        save_pretrained(files[0], parse_path(folder), push=push)
 
     def encode(
         self,
@@ -162,7 +162,7 @@ class MotionTransfer:
             listener: Told what the user should know, see `motion_transfer.events`.
         Raises: InputError and its kinds.
         """
-        model = None if estimator_model is None else Path(estimator_model)
+        model = read_path(estimator_model)
         size = self.recipe.texture_size
         if isinstance(source, np.ndarray):
             if isinstance(iuv, str | PathLike | Sequence) or garments:
@@ -237,7 +237,7 @@ class MotionTransfer:
         options = RenderOptions(
             **vars(self._options),
             source=(source.source.photo.path,),
-            driver=DRIVER if isinstance(driver, np.ndarray) else Path(driver),
+            driver=DRIVER if isinstance(driver, np.ndarray) else parse_path(driver),
             output=NOWHERE,
             background=str(background),
             background_fit=background_fit,
@@ -255,13 +255,11 @@ class MotionTransfer:
             window=window,
             frames=parse_frames(frames) if isinstance(frames, str) else frames or (None, None),
             estimator=estimator,
-            estimator_model=None if estimator_model is None else Path(estimator_model),
+            estimator_model=read_path(estimator_model),
             frame_rate=None if frame_rate is None else parse_rate(str(frame_rate)),
             workers=workers,
         )
-        return RenderedFrames(
-            options, source, given, listener, folder=None if folder is None else Path(folder)
-        )
+        return RenderedFrames(options, source, given, listener, folder=read_path(folder))
 
 
 class RenderedFrames:
@@ -341,6 +339,11 @@ class _DriverFrames:
 
     def open(self) -> IuvReader:
         return open_reader(FrameStream(self.frames, DRIVER), self.order)
+
+
+def read_path(path: AnyPath | None) -> Path | None:
+    """Read a path that may be left out. Raises: InputError, see `parse_path`."""
+    return None if path is None else parse_path(path)
 
 
 def list_paths(paths: AnyPath | Sequence[AnyPath] | None) -> tuple[Path, ...]:

@@ -33,6 +33,14 @@ def test_what_is_not_given_is_as_on_the_command_line(asked) -> None:
     assert asked("a.png", "d", "o.mp4") == RenderOptions(**given)
 
 
+@pytest.mark.parametrize("given", [("", "d", "o.mp4"), ("a.png", "", "o.mp4"), ("a.png", "d", "")])
+def test_an_empty_path_is_not_the_folder_where_we_are(asked, given: tuple[str, ...]) -> None:
+    with pytest.raises(InputError, match="a path is empty; name a file or a folder"):
+        asked(*given)
+    with pytest.raises(InputError, match="a path is empty"):
+        asked("a.png", "d", "o.mp4", weights="")
+
+
 def test_one_source_or_several(asked) -> None:
     """Text or paths, alone or in a sequence; IUV likewise, one for each."""
     for one in ("a.png", Path("a.png"), ["a.png"], (Path("a.png"),)):
