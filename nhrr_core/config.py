@@ -59,6 +59,7 @@ class RenderSizes:
     residual_blocks: int
     shortcut: bool
     even: bool
+    bilinear: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,10 +100,12 @@ class ModelConfig:
         prior: FeatureNet reads a texture that is learned with it and is the same for everybody:
             what people look like where a photo does not show them, in the face above all.
         even: RenderNet's up-sampling can draw no checkerboard (`UpConvolution`).
+        bilinear: Its last one draws no lines at the outlines of what the layers before mean,
+            either: it is bilinear.
     Source: the paper, Sec. 3 and 4.4; `texture-features` its Sec. 4.6, as future work; `cbi` from
         Grigorev et al., "Coordinate-based texture inpainting" (CVPR 2019); `dpt` from Neverova et
         al., "Dense pose transfer" (ECCV 2018); widths from Pix2PixHD's global generator (RenderNet)
-        and U-Net (FeatureNet). Departs from it: the last nine. `visibility_input` is on; those
+        and U-Net (FeatureNet). Departs from it: the last ten. `visibility_input` is on; those
         after it are off, and on in `lite`, so that networks learn in hours what to change instead
         of learning in days to copy.
     """
@@ -124,6 +127,7 @@ class ModelConfig:
     geometry: bool = False
     prior: bool = False
     even: bool = False
+    bilinear: bool = False
 
     def __post_init__(self) -> None:
         if self.variant not in VARIANTS:
@@ -264,6 +268,7 @@ class ModelConfig:
             residual_blocks=self.residual_blocks,
             shortcut=self.geometry,
             even=self.even,
+            bilinear=self.bilinear,
         )
 
     @property
@@ -300,5 +305,6 @@ PRESETS = {
         geometry=True,
         prior=True,
         even=True,
+        bilinear=True,
     ),
 }

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
 import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
 from nhrr_core.config import RenderSizes
+
+Projection = Callable[[Float[Tensor, "I O 3 3"]], Float[Tensor, "I O 3 3"]]
 
 LAST_LAYERS = 3
 """How many there are after the norms: padding, 7x7 and tanh."""
@@ -37,21 +41,22 @@ class UpConvolution(nn.ConvTranspose2d):
 
     A pixel of an even row and column sees the kernel's centre alone, others see two or four taps.
     Where those four sets of taps have different sums, it draws a checkerboard over whatever is
-    flat. `even` takes that freedom away: the kernel is replaced by the nearest one with equal
-    sums, which leaves flat what is flat, and costs nothing once the weights are fixed. Bilinear
-    and nearest up-sampling are among what is left.
+    flat; where the taps of a set differ, a line at a step of its input, on pixels of one parity
+    only. Among the kernels that cannot, those of bilinear and of nearest up-sampling.
 
-    Source of the condition: Sugawara, Shiota and Kiya, "Checkerboard-artifacts-free CNNs" (2019).
+    Args:
+        project: What takes those freedoms away: the weights are replaced by the nearest ones that
+            may be, which costs nothing once they are fixed. `even_kernel`, or `bilinear_kernel`.
     """
 
-    def __init__(self, inputs: int, outputs: int, *, even: bool) -> None:
+    def __init__(self, inputs: int, outputs: int, *, project: Projection | None) -> None:
         super().__init__(inputs, outputs, 3, stride=2, padding=1, output_padding=1)
-        self.even = even
+        self._project = project
 
     @property
     def kernel(self) -> Float[Tensor, "I O 3 3"]:
         """The weights that are convolved with."""
-        return even_kernel(self.weight) if self.even else self.weight
+        return self._project(self.weight) if self._project else self.weight
 
     def forward(self, x: Float[Tensor, "B I H W"]) -> Float[Tensor, "B O 2*H 2*W"]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Convolve to twice the height and width."""
@@ -63,6 +68,8 @@ def even_kernel(weight: Float[Tensor, "I O 3 3"]) -> Float[Tensor, "I O 3 3"]:
 
     The orthogonal projection: with S_p the sum of the n_p taps of parity p, each of these changes
     by (m - S_p) / n_p, where m is the mean of all S_p weighted by 1 / n_p.
+
+    Source of the condition: Sugawara, Shiota and Kiya, "Checkerboard-artifacts-free CNNs" (2019).
     """
     rows = torch.stack([weight[..., 1], weight[..., 0] + weight[..., 2]], -1)
     sums = torch.stack([rows[..., 1, :], rows[..., 0, :] + rows[..., 2, :]], -2)
@@ -73,15 +80,24 @@ def even_kernel(weight: Float[Tensor, "I O 3 3"]) -> Float[Tensor, "I O 3 3"]:
     return weight + change[..., [1, 0, 1], :][..., [1, 0, 1]]
 
 
+def bilinear_kernel(weight: Float[Tensor, "I O 3 3"]) -> Float[Tensor, "I O 3 3"]:
+    """Project kernels onto multiples of bilinear up-sampling's: `even`, and with taps all alike."""
+    line = weight.new_tensor([0.5, 1.0, 0.5])
+    bilinear = torch.outer(line, line)
+    share = (weight * bilinear).sum((-2, -1), keepdim=True) / bilinear.square().sum()
+    return share * bilinear
+
+
 class RenderNet(nn.Module):
     """Pix2PixHD's global generator: 7x7, down blocks, residual blocks, up blocks, 7x7, tanh.
 
     Args:
         sizes: `width` is the channels of the first convolution, which double at each down block;
             with `shortcut` the last convolution reads the network's input, too; with `even` the up
-            blocks can draw no checkerboard, see `UpConvolution`.
+            blocks can draw no checkerboard, and with `bilinear` the last one no lines, either, see
+            `UpConvolution`.
     Source: the paper, Sec. 3.4, Eq. 3; layer shapes from Pix2PixHD (Wang et al., CVPR 2018).
-        Departs from it: `shortcut` and `even`, off by default.
+        Departs from it: `shortcut`, `even` and `bilinear`, off by default.
     """
 
     def __init__(self, sizes: RenderSizes) -> None:
@@ -98,7 +114,10 @@ class RenderNet(nn.Module):
         layers += [ResidualBlock(widest) for _ in range(sizes.residual_blocks)]
         for i in reversed(range(sizes.down_blocks)):
             narrow = width * 2**i
-            layers += [UpConvolution(narrow * 2, narrow, even=sizes.even)]
+            project = even_kernel if sizes.even else None
+            if sizes.bilinear and i == 0:
+                project = bilinear_kernel
+            layers += [UpConvolution(narrow * 2, narrow, project=project)]
             layers += [nn.InstanceNorm2d(narrow), nn.ReLU(inplace=True)]
         read = width + sizes.inputs * sizes.shortcut
         layers += [nn.ReflectionPad2d(3), nn.Conv2d(read, sizes.outputs, 7), nn.Tanh()]

@@ -36,7 +36,7 @@ Precision = Literal["auto", "fp32", "bf16"]
 
 LOSSES = "Losses (the paper's; one without its network is an error)"
 DEFAULT_PRESET = "lite"
-FREE_TO_CHANGE = ("colour_margin", "clearance", "geometry", "prior", "even")
+FREE_TO_CHANGE = ("colour_margin", "clearance", "geometry", "prior", "even", "bilinear")
 """Settings of the model that a run may turn on, whatever it starts from."""
 
 PEOPLE = "people"

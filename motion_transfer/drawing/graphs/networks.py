@@ -53,10 +53,13 @@ class Convolutions:
         y = self._append("Conv", x, name, weight, bias, {"pads": [1, 1, 1, 1]})
         return self._graph("Relu", y)
 
-    def doubling(self, x: str, name: str, *, even: bool) -> str:
+    def doubling(self, x: str, name: str, *, even: bool, bilinear: bool) -> str:
         """A 3x3 transposed convolution of stride 2."""
         weight = self._weights[f"{name}.weight"]
-        weight = even_kernel(weight) if even else weight
+        if bilinear:
+            weight = bilinear_kernel(weight)
+        elif even:
+            weight = even_kernel(weight)
         places = {"strides": [2, 2], "pads": [1, 1, 1, 1], "output_padding": [1, 1]}
         return self._append("ConvTranspose", x, name, weight, None, places)
 
@@ -172,9 +175,10 @@ def append_render_net(
         y = graph("Relu", norm(y, width))
         y = convolutions.plain(_reflect(graph, y, 1), f"{block}.body.5")
         x = graph("Add", x, norm(y, width))
-    for _ in range(config.down_blocks):
+    for i in reversed(range(config.down_blocks)):
         width //= 2
-        x = convolutions.doubling(x, next(names), even=config.even)
+        bilinear = config.bilinear and i == 0
+        x = convolutions.doubling(x, next(names), even=config.even, bilinear=bilinear)
         x = graph("Relu", norm(x, width))
     if config.geometry:  # the shortcut: what is as fine as a finger is lost in the layers before
         x = graph.join(x, features)
@@ -190,6 +194,13 @@ def even_kernel(weight: Float32[np.ndarray, "I O 3 3"]) -> Float32[np.ndarray, "
     mean = (sums * share).sum((-2, -1), keepdims=True) / share.sum()
     change = (mean - sums) * share
     return weight + change[..., [1, 0, 1], :][..., [1, 0, 1]]
+
+
+def bilinear_kernel(weight: Float32[np.ndarray, "I O 3 3"]) -> Float32[np.ndarray, "I O 3 3"]:
+    """Project kernels as `nhrr_core.render_net.bilinear_kernel` does."""
+    bilinear = np.outer(*[np.array([0.5, 1, 0.5], np.float32)] * 2)
+    share = (weight * bilinear).sum((-2, -1), keepdims=True) / np.square(bilinear).sum()
+    return share * bilinear
 
 
 def enlarge(graph: Graph, x: str, factor: int) -> str:

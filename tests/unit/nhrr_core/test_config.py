@@ -30,6 +30,7 @@ def test_defaults_are_the_papers() -> None:
         "colour_margin": False,
         "prior": False,
         "even": False,
+        "bilinear": False,
     }
 
 
@@ -46,6 +47,7 @@ def test_presets() -> None:
         geometry=True,
         prior=True,
         even=True,
+        bilinear=True,
     )
 
 

@@ -9,12 +9,12 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from nhrr_core import ModelConfig, RenderNet
 from nhrr_core.config import RenderSizes
-from nhrr_core.render_net import ResidualBlock, UpConvolution, even_kernel
+from nhrr_core.render_net import ResidualBlock, UpConvolution, bilinear_kernel, even_kernel
 
 
 def small(**changes: Any) -> RenderNet:
     sizes = {"inputs": 5, "outputs": 3, "width": 4, "down_blocks": 2, "residual_blocks": 2}
-    sizes |= {"shortcut": False, "even": False}
+    sizes |= {"shortcut": False, "even": False, "bilinear": False}
     return RenderNet(RenderSizes(**{**sizes, **changes})).eval()
 
 
@@ -144,7 +144,7 @@ def test_gradient_reaches_every_weight_and_the_features() -> None:
 
 
 def test_up_convolution_is_the_papers_transposed_one() -> None:
-    up = UpConvolution(4, 3, even=False)
+    up = UpConvolution(4, 3, project=None)
     plain = nn.ConvTranspose2d(4, 3, 3, stride=2, padding=1, output_padding=1)
     plain.load_state_dict(up.state_dict())
     x = torch.rand(2, 4, 5, 6)
@@ -160,7 +160,11 @@ def test_even_up_convolution_leaves_flat_what_is_flat() -> None:
     torch.manual_seed(3)
     flat = torch.rand(1, 4, 1, 1).expand(1, 4, 8, 8)
     with torch.no_grad():
-        even, free = (inner(UpConvolution(4, 3, even=each)(flat)) for each in (True, False))
+        even, bilinear, free = (
+            inner(UpConvolution(4, 3, project=each)(flat))
+            for each in (even_kernel, bilinear_kernel, None)
+        )
+    assert (bilinear - bilinear.mean((2, 3), keepdim=True)).abs().max() < 1e-6
     assert (even - even.mean((2, 3), keepdim=True)).abs().max() < 1e-6
     assert (free - free.mean((2, 3), keepdim=True)).abs().max() > 0.01
 
@@ -176,3 +180,27 @@ def test_even_kernel_is_the_nearest_and_keeps_bilinear_up_sampling() -> None:
     # an orthogonal projection: what it takes away has no part within what is allowed
     other = even_kernel(torch.randn(2, 3, 3, 3))
     assert ((weight - even) * other).sum().abs() < 1e-4
+    # bilinear ones are among the even ones, and theirs is an orthogonal projection as well
+    torch.testing.assert_close(bilinear_kernel(even), bilinear_kernel(weight), rtol=0, atol=1e-6)
+    assert torch.allclose(bilinear_kernel(bilinear), bilinear, atol=1e-6)
+
+
+def test_bilinear_up_convolution_is_a_1x1_convolution_enlarged() -> None:
+    torch.manual_seed(3)
+    up = UpConvolution(4, 3, project=bilinear_kernel)
+    nn.init.zeros_(up.bias)
+    image = torch.rand(1, 4, 6, 6)
+    with torch.no_grad():
+        small = torch.einsum("iohw,biyx->boyx", up.kernel[..., 1:2, 1:2], image)
+        enlarged = nn.functional.interpolate(
+            small, size=(11, 11), mode="bilinear", align_corners=True
+        )
+        torch.testing.assert_close(up(image)[..., :11, :11], enlarged, rtol=0, atol=1e-5)
+
+
+def test_only_the_last_up_block_is_bilinear() -> None:
+    network = small(even=True, bilinear=True)
+    ups = [layer for layer in network.layers if isinstance(layer, UpConvolution)]
+    for up in ups[:-1]:
+        assert torch.equal(up.kernel, even_kernel(up.weight))
+    assert torch.equal(ups[-1].kernel, bilinear_kernel(ups[-1].weight))

@@ -41,7 +41,7 @@ CONFIGURATIONS: list[dict[str, Any]] = [
     {"geometry": True},
     {"clearance": True},
     EVERYTHING,
-    {**EVERYTHING, "prior": True},
+    {**EVERYTHING, "prior": True, "bilinear": True},
     {**EVERYTHING, "variant": "warp-cond"},
     {**EVERYTHING, "image_size": 40, "texture_size": 48},
 ]
