@@ -22,6 +22,7 @@ from motion_transfer.drawing.canvas import lay_over
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, DRAFT
 from motion_transfer.errors import InputError
 from motion_transfer.estimate.frames import estimate_frames
+from motion_transfer.estimate.opening import landmark_estimators
 from motion_transfer.events import FramesDone, Stage
 from motion_transfer.media.iuv.formats import MISSING
 from motion_transfer.render.memory import EncodedSource, MotionTransfer
@@ -29,6 +30,7 @@ from motion_transfer.render.memory import EncodedSource, MotionTransfer
 CATEGORY = "motion transfer"
 DRAFT_WEIGHTS = f"{DRAFT} (a draft without a network)"
 SIZES = ("driver", "crop", "even")
+ESTIMATOR = "What finds people in pictures; the heavy model is nearer, and slower."
 WHO = "largest, an index from the left (0 first), or a box x0,y0,x1,y1 in pixels."
 IN_INPUT = "in ComfyUI's input folder"
 
@@ -42,6 +44,7 @@ class Photograph:
     photo: Path | UInt8[np.ndarray, "H W C"]
     iuv: UInt8[np.ndarray, "H W 3"] | None
     person: str
+    estimator: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,7 @@ class Motion:
     person: str
     missing: str | None
     chosen: str
+    estimator: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +103,7 @@ class LoadSource(_FileNode):
                     "MASK", "1 where the person is, as segmentation gives; Load Image's is inverse."
                 ),
                 "iuv": _socket("IMAGE", "The photo's IUV: I, U and V as red, green and blue."),
+                "estimator": _choice(landmark_estimators(), ESTIMATOR),
             },
         }
 
@@ -109,15 +114,16 @@ class LoadSource(_FileNode):
         image: Tensor | None = None,
         mask: Tensor | None = None,
         iuv: Tensor | None = None,
+        estimator: str = "blazepose",
     ) -> tuple[Photograph]:
         if (image is None) == (not file):
             raise InputError("a source is an image or a file; connect the one, or name the other")
         if image is None:
             if mask is not None or iuv is not None:
                 raise InputError("mask and iuv belong to an image; connect that, or leave them out")
-            return (Photograph(host.find_input(file), None, person),)
+            return (Photograph(host.find_input(file), None, person, estimator),)
         body = None if iuv is None else to_pictures(iuv[:1])[0]
-        return (Photograph(to_photo(image, mask), body, person),)
+        return (Photograph(to_photo(image, mask), body, person, estimator),)
 
 
 class EstimateIuv:
@@ -142,11 +148,17 @@ class EstimateIuv:
                 "frame_rate": ("FLOAT", {**rate, "tooltip": "Of the clip, for smoothing."}),
                 "person": _text("all", f"all, {WHO}"),
                 "missing": _choice(MISSING[1:] + MISSING[:1], "Of frames that show nobody."),
-            }
+            },
+            "optional": {"estimator": _choice(landmark_estimators(), ESTIMATOR)},
         }
 
     def estimate(
-        self, images: Tensor, frame_rate: float, person: str, missing: str
+        self,
+        images: Tensor,
+        frame_rate: float,
+        person: str,
+        missing: str,
+        estimator: str = "blazepose",
     ) -> tuple[Tensor, Tensor]:
         progress = host.Progress()
         progress(Stage("estimate", len(images)))
@@ -156,6 +168,7 @@ class EstimateIuv:
             frame_rate=frame_rate,
             person=person,
             missing=missing,  # type: ignore[arg-type] - one of the choices
+            estimator=estimator,
             with_alpha=True,
         )
         for index, frame in enumerate(frames):
@@ -186,16 +199,26 @@ class LoadDriver(_FileNode):
                 "frames": _text("", "Only these, A:B, counted from 0, B excluded; empty: all."),
                 "missing": _choice(("auto", *MISSING), "Of frames that show nobody."),
             },
-            "optional": {"iuv": _socket("IMAGE", "IUV frames, as Estimate IUV gives them.")},
+            "optional": {
+                "iuv": _socket("IMAGE", "IUV frames, as Estimate IUV gives them."),
+                "estimator": _choice(landmark_estimators(), ESTIMATOR),
+            },
         }
 
     def load(
-        self, file: str, person: str, frames: str, missing: str, iuv: Tensor | None = None
+        self,
+        file: str,
+        person: str,
+        frames: str,
+        missing: str,
+        iuv: Tensor | None = None,
+        estimator: str = "blazepose",
     ) -> tuple[Motion]:
         if (iuv is None) == (not file):
             raise InputError("a driver is IUV or a file; connect the one, or name the other")
         motion = host.find_input(file) if iuv is None else to_pictures(iuv)
-        return (Motion(motion, person, None if missing == "auto" else missing, frames),)
+        shown = None if missing == "auto" else missing
+        return (Motion(motion, person, shown, frames, estimator),)
 
 
 class EncodeSource:
@@ -225,7 +248,11 @@ class EncodeSource:
             renderer=DRAFT if draft else DEFAULT_RENDERER,
         )
         person = model.encode(
-            source.photo, source.iuv, person=source.person, listener=host.Progress()
+            source.photo,
+            source.iuv,
+            person=source.person,
+            estimator=source.estimator,
+            listener=host.Progress(),
         )
         return (Encoded(model, person),)
 
@@ -293,6 +320,7 @@ class RenderFrames:
             driver_person=driver.person,
             missing=driver.missing,  # type: ignore[arg-type] - likewise
             frames=driver.chosen or None,
+            estimator=driver.estimator,
             folder=host.temporary_folder(),
             listener=host.Progress(),
         )

@@ -49,7 +49,9 @@ def claim_folder(settings_file: Path, settings: Mapping[str, Any], items: str) -
         raise OutputError(f"{error}; choose another folder") from error
     other = [name for name, value in settings.items() if found.get(name) != value]
     if other:
-        told = ", ".join(f"{name} {found.get(name)}" for name in other)
+        told = ", ".join(
+            f"{name} {shown(found.get(name))}, not {shown(settings[name])}" for name in other
+        )
         raise OutputError(
             f"{folder} holds {items} made with {told}; use the same settings to add to them, or"
             " choose another folder"

@@ -205,6 +205,26 @@ def test_a_source_is_one_thing(comfy: ComfyUI) -> None:
         load("me.png", "largest", torch.zeros(1, 8, 8, 3))
 
 
+def test_the_estimator_that_is_chosen_looks(studio, comfy: ComfyUI) -> None:
+    """One that nobody knows tells that the choice arrived; all that can be chosen are known."""
+    clip = torch.zeros(2, 32, 32, 3)
+    Image.fromarray(to_bytes(clip)[0]).save(comfy.input / "me.png")
+    unknown = pytest.raises(InputError, match="'nobody'; supported are blazepose")
+    with unknown:
+        nodes.EstimateIuv().estimate(clip, 30.0, "all", "empty", estimator="nobody")
+    [source] = nodes.LoadSource().load("", "largest", clip, estimator="nobody")
+    with unknown:
+        nodes.EncodeSource().encode(source, nodes.DRAFT_WEIGHTS)
+    [driver] = nodes.LoadDriver().load("me.png", "largest", "", "auto", estimator="nobody")
+    model = MotionTransfer(renderer=nodes.DRAFT)
+    encoded = nodes.Encoded(model, model.encode(studio.source("source")))
+    with unknown:
+        nodes.RenderFrames().render(encoded, driver, **PLAIN)
+    for node in (nodes.EstimateIuv, nodes.LoadSource, nodes.LoadDriver):
+        choices, _ = node.INPUT_TYPES()["optional"]["estimator"]
+        assert set(choices) == {"blazepose", "blazepose-heavy"}
+
+
 def test_every_node_says_what_it_is(comfy: ComfyUI) -> None:
     assert NODE_CLASS_MAPPINGS.keys() == NODE_DISPLAY_NAME_MAPPINGS.keys()
     for kind in NODE_CLASS_MAPPINGS.values():

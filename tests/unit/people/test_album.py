@@ -83,7 +83,7 @@ def test_several_workers_write_the_same(tmp_path):
 
 def test_people_of_other_settings_are_not_mixed_in(tmp_path):
     write_album(options(tmp_path, count=1))
-    with pytest.raises(OutputError, match="people made with seed 0; use the same settings"):
+    with pytest.raises(OutputError, match="people made with seed 0, not 1; use the same settings"):
         write_album(options(tmp_path, count=1, seed=1))
 
 
