@@ -38,6 +38,9 @@ MARGIN_LEVELS = 5
 OUTLINE_PIXELS = 24
 """RenderNet is told distances to the outline up to this; clothes and hair seldom reach further."""
 
+DETAIL_FACTOR = 4
+"""How many times as fine as FeatureNet's texture the one is whose colours are carried past it."""
+
 FILL_FROM, FILL_TO = 32, 64
 """How many places along a side of the texture colours are spread from, and how many to."""
 
@@ -206,12 +209,14 @@ class ModelConfig:
         return self.variant in ("warp-cond", "cbi", "dpt")
 
     @property
-    def finest_texture(self) -> int:
-        """Side of the largest partial texture that is of use, texels.
+    def has_detail(self) -> bool:
+        """Whether a finer texture than FeatureNet's is of use: its colours are carried past it."""
+        return self.colour_shortcut and self.has_feature_net and self.variant != "cbi"
 
-        Where colours are carried past FeatureNet it is twice the side that FeatureNet works on.
-        """
-        return self.texture_size * (2 if self.has_feature_net and self.colour_shortcut else 1)
+    @property
+    def finest_texture(self) -> int:
+        """Side of the largest partial texture that is of use, texels."""
+        return self.texture_size * (DETAIL_FACTOR if self.has_detail else 1)
 
     @property
     def feature_inputs(self) -> int:

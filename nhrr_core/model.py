@@ -101,16 +101,15 @@ class NeuralReRenderer(nn.Module):
 
     def encode_texture(
         self,
-        texture: Float[Tensor, "B 3 T T"],
-        visibility: Float[Tensor, "B 1 T T"],
+        texture: Float[Tensor, "B 3 t t"],
+        visibility: Float[Tensor, "B 1 t t"],
         clearance: Float[Tensor, "B 2 128 128"] | None = None,
         pictures: UInt8[Tensor, "B P 6 S S"] | None = None,
     ) -> Float[Tensor, "B D T T"]:
         """Compute the UV feature map of a partial texture; for the warp variants it is the texture.
 
-        With `config.colour_shortcut` the texture may be a multiple of `config.texture_size`:
-        FeatureNet works at its own size, and what it adds to the colours is added to the finer.
-        What is hidden is no finer than that: guesses gain nothing by it.
+        With `config.has_detail` the texture may be a multiple of `config.texture_size`: FeatureNet
+        works at its own size, and `detail` tells what is finer.
 
         Args:
             visibility: 1 where the texture shows something, else 0.
@@ -121,6 +120,7 @@ class NeuralReRenderer(nn.Module):
         """
         if self.config.reads_photo and pictures is None:
             raise ShapeError(f"variant {self.config.variant} reads the source's picture; give it")
+        texture, visibility = shrink_texture(texture, visibility, self._factor(texture))
         carried = [self._complete(texture, visibility, pictures)]
         if self.config.clearance:
             if clearance is None:
@@ -137,6 +137,27 @@ class NeuralReRenderer(nn.Module):
             carried.append(F.interpolate(picture, texture.shape[2:], mode="nearest-exact"))
         return torch.cat(carried, dim=1)
 
+    def detail(
+        self, texture: Float[Tensor, "B 3 T T"], visibility: Float[Tensor, "B 1 T T"]
+    ) -> Float[Tensor, "B 3 T T"] | None:
+        """Tell what a texture finer than the feature map shows: what its colours differ by.
+
+        What is hidden is no finer than the map, where this is 0: guesses gain nothing by it.
+
+        Returns: What is added to the map's first three channels; None for a texture of its size.
+        """
+        factor = self._factor(texture)
+        if factor == 1:
+            return None
+        carried, *_ = self._filled(*shrink_texture(texture, visibility, factor))
+        enlarged = F.interpolate(carried, scale_factor=factor, mode="bilinear")
+        return (texture - enlarged) * visibility
+
+    def _factor(self, texture: Float[Tensor, "B 3 T T"]) -> int:
+        """How many times as fine as FeatureNet's a texture is, or 1: a size of its own."""
+        factor, rest = divmod(texture.shape[-1], self.config.texture_size)
+        return factor if self.config.has_detail and not rest else 1
+
     def _places_like(self, texture: Float[Tensor, "B C T T"]) -> Float[Tensor, "B 3 T T"]:
         """The position of each texel on the body, each axis in [-1, 1]."""
         places = F.interpolate(self.places, texture.shape[2:], mode="nearest-exact")
@@ -152,24 +173,15 @@ class NeuralReRenderer(nn.Module):
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
             raise ShapeError(f"texture {list(texture.shape)}: its sides must be multiples of 16")
-        factor, rest = divmod(texture.shape[-1], self.config.texture_size)
-        if rest or not self.config.colour_shortcut:
-            factor = 1  # a size of its own, which FeatureNet works on as it is
-        coarse = shrink_texture(texture, visibility, factor)
         if self.config.variant == "cbi":
             assert pictures is not None
-            return self._complete_coordinates(texture, visibility, pictures[:, 0], factor)
-        own = self._filled(*coarse, self._features_like(coarse[0], pictures))
+            return self._complete_coordinates(texture, visibility, pictures[:, 0])
+        own = self._filled(texture, visibility, self._features_like(texture, pictures))
         feature_map = self.feature_net(torch.cat(own, dim=1))
         if not self.config.colour_shortcut:
             return feature_map
-        carried = own[0][:, :COLOUR_CHANNELS]
-        if factor > 1:
-            feature_map = enlarge_map(feature_map, factor)
-            # smoothly: mirror images and surroundings are coarse, and would show their texels
-            carried = torch.where(visibility > 0, texture, enlarge_map(carried, factor))
         colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
-        return torch.cat([colours + carried, others], dim=1)
+        return torch.cat([colours + own[0][:, :COLOUR_CHANNELS], others], dim=1)
 
     def _features_like(
         self,
@@ -190,7 +202,6 @@ class NeuralReRenderer(nn.Module):
         texture: Float[Tensor, "B 3 T T"],
         visibility: Float[Tensor, "B 1 T T"],
         picture: UInt8[Tensor, "B 6 S S"],
-        factor: int,
     ) -> Float[Tensor, "B 5 T T"]:
         """Colour each hidden texel as the place in the picture that FeatureNet takes it from.
 
@@ -198,7 +209,7 @@ class NeuralReRenderer(nn.Module):
         """
         assert self.feature_net is not None
         photo, iuv = picture.tensor_split([COLOUR_CHANNELS], dim=1)
-        side = texture.shape[-1] // factor
+        side = texture.shape[-1]
         own = self._filled(*extract_texture(pixel_places(photo), iuv, self.charts, side))
         places = self.feature_net(torch.cat(own, dim=1)).float()
         if self.config.colour_shortcut:  # what it starts from is a guess as good as its colours
@@ -209,9 +220,8 @@ class NeuralReRenderer(nn.Module):
             padding_mode="border",
             align_corners=False,
         )
-        completed = enlarge_map(torch.cat([found, places], dim=1), factor).to(texture.dtype)
-        colours = torch.where(visibility > 0, texture, completed[:, :COLOUR_CHANNELS])
-        return torch.cat([colours, completed[:, COLOUR_CHANNELS:]], dim=1)
+        colours = torch.where(visibility > 0, texture, found.to(texture.dtype))
+        return torch.cat([colours, places.to(texture.dtype)], dim=1)
 
     def _filled(
         self,
@@ -245,7 +255,10 @@ class NeuralReRenderer(nn.Module):
         return fill_texture(texture, shown, self.position, self.surroundings), shown
 
     def feature_image(
-        self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
+        self,
+        feature_map: Float[Tensor, "M D T T"],
+        target_iuv: UInt8[Tensor, "B 3 H W"],
+        detail: Float[Tensor, "M 3 t t"] | None = None,
     ) -> Float[Tensor, "B C H W"]:
         """Compute the feature image R_s->t that RenderNet reads.
 
@@ -256,6 +269,8 @@ class NeuralReRenderer(nn.Module):
         config = self.config
         looked_up, picture = feature_map.tensor_split([config.sampled_channels], dim=1)
         features = sample_features(looked_up, target_iuv, self.charts)
+        if detail is not None:
+            features[:, :COLOUR_CHANNELS] += sample_features(detail, target_iuv, self.charts)
         own, places = features, features[:, :0]
         if config.geometry:
             own, places = features[:, :-POSITION_CHANNELS], features[:, -POSITION_CHANNELS:]
@@ -277,10 +292,15 @@ class NeuralReRenderer(nn.Module):
         return torch.cat(image, dim=1) if len(image) > 1 else own
 
     def render(
-        self, feature_map: Float[Tensor, "M D T T"], target_iuv: UInt8[Tensor, "B 3 H W"]
+        self,
+        feature_map: Float[Tensor, "M D T T"],
+        target_iuv: UInt8[Tensor, "B 3 H W"],
+        detail: Float[Tensor, "M 3 t t"] | None = None,
     ) -> Float[Tensor, "B K H W"]:
         """Render frames of the source in the target poses, one feature map for all or one for each.
 
+        Args:
+            detail: Of the source, where it has any, see `detail`.
         Raises: ShapeError if H or W is not a multiple of 2**down_blocks.
         """
         multiple = 2**self.config.down_blocks
@@ -288,7 +308,7 @@ class NeuralReRenderer(nn.Module):
             raise ShapeError(
                 f"target IUV {list(target_iuv.shape)}: its sides must be multiples of {multiple}"
             )
-        feature_image = self.feature_image(feature_map, target_iuv)
+        feature_image = self.feature_image(feature_map, target_iuv, detail)
         return self.blend(self.render_net(feature_image), feature_image)
 
     def blend(
@@ -344,10 +364,3 @@ def pixel_places(photo: Shaped[Tensor, "B _ H W"]) -> Float[Tensor, "B 2 H W"]:
     )
     grid = torch.stack(torch.meshgrid(x, y, indexing="xy"))
     return grid.expand(len(photo), -1, -1, -1)
-
-
-def enlarge_map(feature_map: Float[Tensor, "B D T T"], factor: int) -> Tensor:
-    """Enlarge a map so many times, bilinearly."""
-    if factor == 1:
-        return feature_map
-    return F.interpolate(feature_map, scale_factor=factor, mode="bilinear")

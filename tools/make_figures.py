@@ -19,6 +19,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from motion_transfer.drawing.canvas import colour_iuv, paste
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.window import Window
 from motion_transfer.events import ignore
 from motion_transfer.media.iuv.opening import open_reader, open_stream
@@ -46,6 +47,7 @@ def main(assets: Path) -> None:
     recipe = open_recipe(options)
     source = read_source(options, recipe.texture_size)
     feature_map = recipe.appearance_of(source)
+    assert isinstance(feature_map, FeatureMap)
     reader = open_reader(open_stream(options.driver))
     renderer = recipe.renderer(feature_map)
     target = next(iter(reader.read(MOMENT, MOMENT + 1)))
@@ -67,7 +69,7 @@ def main(assets: Path) -> None:
                 panel(source.photo.rgb, "source photo"),
                 panel(colour_iuv(source.iuv), "its IUV"),
                 panel(partial.astype(np.uint8), "partial texture: what is seen"),
-                panel(picture(feature_map[0, :3]), "feature map (3 of 16), once"),
+                panel(picture(feature_map.features[0, :3]), "feature map (3 of 16), once"),
                 panel(colour_iuv(target), "target IUV, per frame"),
                 panel(result, "frame"),
             ]

@@ -7,7 +7,8 @@ The file is safetensors. Its metadata are one JSON text (`FACTS`), its tensors:
     texture/T         3 x T x T float32, the partial texture; for one or several sizes T
     visibility/T      1 x T x T uint8, 0 or 1
     clearance         2 x 128 x 128 float32, see `nhrr_core.unfold_clearance`
-    features/DIGEST   D x T x T float32, the feature map that the weights with that SHA-256 make
+    map/DIGEST        D x T x T float32, the feature map that the weights with that SHA-256 make
+    detail/DIGEST     3 x T x T float32, what the photos show finer, where the weights use it
 
 Textures and feature maps are kept as they were computed, and pictures without loss: what is drawn
 from the file equals what is drawn from the photos, to the byte.
@@ -27,6 +28,7 @@ from jaxtyping import Float32, UInt8
 from safetensors import safe_open
 from safetensors.numpy import save_file
 
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.source import Source, SourcePicture
 from motion_transfer.drawing.textures import pick_nearest, shrink_texture
 from motion_transfer.errors import InputError, first_line
@@ -34,7 +36,7 @@ from motion_transfer.media.files import check_readable
 from motion_transfer.media.pictures.photo import decode_png, encode_png
 from motion_transfer.media.structured import parse_json, shown
 from motion_transfer.version import __version__
-from nhrr_core.config import CLEARANCE_SIZE
+from nhrr_core.config import CLEARANCE_SIZE, COLOUR_CHANNELS, ModelConfig
 from nhrr_core.parts import PART_COUNT
 
 FACTS = "kept_source"
@@ -53,14 +55,14 @@ AGAIN = "copy it again, or save it again with `mt source save`"
 def save_source(
     path: Path,
     sources: Sequence[Source],
-    features: Mapping[str, Float32[np.ndarray, "1 D T T"]],
+    maps: Mapping[str, FeatureMap],
     facts: Mapping[str, Any],
 ) -> None:
     """Write a source; the same content gives the same bytes.
 
     Args:
         sources: One source, unfolded to one or several sizes of texture.
-        features: What weights make of it, by the SHA-256 of the weights, hexadecimal.
+        maps: What weights make of it, by the SHA-256 of the weights, hexadecimal.
         facts: Where it comes from, as JSON can hold it.
     Raises: OSError.
     """
@@ -78,7 +80,10 @@ def save_source(
         tensors[f"visibility/{size}"] = each.visibility.astype(np.uint8)
     if source.clearance is not None:
         tensors["clearance"] = source.clearance
-    tensors |= {f"features/{digest}": each[0] for digest, each in features.items()}
+    for digest, each in maps.items():
+        tensors[f"map/{digest}"] = each.features[0]
+        if each.detail is not None:
+            tensors[f"detail/{digest}"] = each.detail[0]
     told = {**facts, "format": FORMAT, "program": __version__, "notes": list(source.notes)}
     metadata = {FACTS: json.dumps(told, sort_keys=True, ensure_ascii=False)}
     whole = {name: np.ascontiguousarray(each) for name, each in tensors.items()}
@@ -121,19 +126,23 @@ def load_picture(path: Path) -> SourcePicture:
         return _read_picture(file, path)
 
 
-def load_features(
-    path: Path, digest: str, shape: tuple[int, int, int, int]
-) -> Float32[np.ndarray, "1 D T T"] | None:
-    """Read the feature map that some weights made; None if only others did.
+def load_features(path: Path, digest: str, config: ModelConfig) -> FeatureMap | None:
+    """Read the feature map that some weights made; None if only others did, or an older program.
 
     Args:
         digest: SHA-256 of the weights, hexadecimal.
-        shape: Of the map that they make.
+        config: Theirs.
     Raises: InputError as `load_source`.
     """
+    side, finest = config.texture_size, config.finest_texture
     with _open(path) as file:
-        name = f"features/{digest}"
-        return file.read(name, "F32", shape[1:])[None] if name in file.shapes else None
+        if f"map/{digest}" not in file.shapes:
+            return None
+        features = file.read(f"map/{digest}", "F32", (config.map_channels, side, side))[None]
+        if not config.has_detail:
+            return FeatureMap(features)
+        detail = file.read(f"detail/{digest}", "F32", (COLOUR_CHANNELS, finest, finest))[None]
+        return FeatureMap(features, detail)
 
 
 def inspect_source(path: Path) -> dict[str, Any]:

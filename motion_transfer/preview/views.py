@@ -12,8 +12,9 @@ from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.backgrounds import Frame
 from motion_transfer.drawing.canvas import Picture, colour_iuv
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.person import find_people
-from motion_transfer.drawing.renderers.interface import Recipe, Renderer
+from motion_transfer.drawing.renderers.interface import Appearance, Recipe, Renderer
 from motion_transfer.drawing.source import Source
 from motion_transfer.errors import InputError, OutputError
 from motion_transfer.events import Listener, ignore
@@ -57,7 +58,7 @@ class Views:
         """Tell the side, px, of the renderer's crops for a window. Raises: InputError."""
         return self._recipe(options).working_size(window_side)
 
-    def prepared(self, options: RenderOptions) -> tuple[np.ndarray, Renderer]:
+    def prepared(self, options: RenderOptions) -> tuple[Appearance, Renderer]:
         """Give what the renderer knows of the source, and the renderer. Raises: InputError."""
         return self._prepare(self._recipe(options), part_of(options, SourceOptions))
 
@@ -107,14 +108,15 @@ class Views:
             raise InputError(
                 f"the {renderer.name} renderer has no feature map; choose nhrr to see one"
             )
-        return appearance[0, : renderer.feature_channels], renderer
+        assert isinstance(appearance, FeatureMap)
+        return appearance.features[0, : renderer.feature_channels], renderer
 
     def _recipe(self, options: RenderOptions) -> Recipe:
         return self._open_recipe(part_of(options, RendererOptions))
 
     def _prepare_source(
         self, recipe: Recipe, options: SourceOptions
-    ) -> tuple[np.ndarray, Renderer]:
+    ) -> tuple[Appearance, Renderer]:
         appearance = recipe.appearance_of(self._read_source(options, recipe.texture_size))
         return appearance, recipe.renderer(appearance)
 

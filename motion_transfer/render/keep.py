@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.kept_source import save_source
 from motion_transfer.drawing.renderers import DEFAULT_RENDERER, DRAFT, RENDERERS
 from motion_transfer.errors import OutputError
@@ -38,11 +39,12 @@ def keep_source(options: KeepOptions, output: Path, listener: Listener = ignore)
     sources = read_sources(options, tuple(dict.fromkeys(sizes)), listener)
     for note in sources[0].notes:
         listener(Notice(note))
-    features = recipe.appearance_of(sources[0])
+    known = recipe.appearance_of(sources[0])
+    assert isinstance(known, FeatureMap)
     facts = {"made of": _tell_pictures(options), "weights": recipe.facts()}
     with work_folder(output) as folder:
         written = folder / output.name
-        save_source(written, sources, {recipe.content: features}, facts)
+        save_source(written, sources, {recipe.content: known}, facts)
         inputs.check()
         publish(written, output)
 

@@ -69,7 +69,7 @@ class EncodedSource:
 
     Attributes:
         source: What the photos show, unfolded.
-        appearance: What the renderer made of it: the feature map, 1 x D x T x T.
+        appearance: What the renderer made of it: a `FeatureMap`, or a texture.
         recipe: The renderer's.
     """
 

@@ -117,7 +117,9 @@ def anneal(progress: float) -> float:
 def _judge(model: NeuralReRenderer, batch: Batch, judge: FeatureNetwork) -> Terms:
     """Draw a lesson, and compare it with what it should look like."""
     with torch.no_grad():
-        feature_image = model.feature_image(batch["feature_map"], batch["target_iuv"])
+        feature_image = model.feature_image(
+            batch["feature_map"], batch["target_iuv"], batch.get("detail")
+        )
     drawn = model.blend(model.render_net(feature_image), feature_image)
     colours, alpha = lay_over_white(drawn), drawn[:, 3:]
     if "learned" in batch:  # elsewhere nothing is asked of the colours

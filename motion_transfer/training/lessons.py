@@ -3,6 +3,7 @@
 Everything but the crops is made once. A lesson is a batch of one:
 
     feature_map    1 x D x T x T, what is drawn from
+    detail         1 x 3 x t x t, what the photos show finer, where the model has a use for it
     target_iuv     1 x 3 x S x S uint8
     target_image   1 x 3 x S x S in [-1, 1], over white where alpha is known
     target_alpha   1 x 1 x S x S in [-1, 1], where it is known
@@ -97,9 +98,9 @@ class Portrait:
 
 @dataclass(frozen=True)
 class Likeness:
-    """A feature map, and the photo that is to be drawn from it, under this light."""
+    """What is drawn from, and the photo that is to be drawn, under this light."""
 
-    feature_map: Float[Tensor, "1 D T T"]
+    known: Batch
     portrait: int
     gains: Gains
 
@@ -158,9 +159,15 @@ class Lessons:
     def _unfold(self, pictures: Sequence[SourcePicture]) -> Source:
         return unfold_source(pictures, self._model.config.finest_texture)
 
-    def _encode(self, source: Source) -> Float[Tensor, "1 D T T"]:
-        """Compute the feature map of a source as a run would."""
-        return encode_source(self._model, source).to(self._device).clone()  # fit for gradients
+    def _encode(self, source: Source) -> Batch:
+        """Compute the feature map of a source, and its detail, as a run would."""
+        found = encode_source(self._model, source)
+        known = {"feature_map": found.features, "detail": found.detail}
+        return {
+            name: torch.from_numpy(array).to(self._device)
+            for name, array in known.items()
+            if array is not None
+        }
 
     def _draw(self, likeness: Likeness) -> Batch:
         """Cut a photo, at a size and a place that are left to chance."""
@@ -175,7 +182,7 @@ class Lessons:
         window = Window(*(middle - cut // 2 for middle in centre), side=cut)
         rgb = lit(cut_picture(window, portrait.rgb, side, BEYOND_THE_PHOTO), likeness.gains)
         lesson = {
-            "feature_map": likeness.feature_map,
+            **likeness.known,
             "target_image": to_tensor(rgb)[None],
             "target_iuv": _stack(window.cut(portrait.iuv, side)),
         }
@@ -218,14 +225,16 @@ class Lessons:
         hidden = np.array([np.count_nonzero(hidden_pixels(iuv, seen)) for iuv in crops])
         fit = np.flatnonzero(hidden >= HIDDEN_ENOUGH * hidden.max())
         spread = np.linspace(0, len(fit) - 1, self._settings.held_poses).round().astype(int)
-        feature_map = self._encode(source)
+        known = self._encode(source)
         held = []
         for index in fit[spread]:
             iuv = _stack(crops[index])
             with torch.no_grad():
-                drawn = self._model.render(feature_map, iuv.to(self._device))
+                drawn = self._model.render(
+                    known["feature_map"], iuv.to(self._device), known.get("detail")
+                )
             lesson = {
-                "feature_map": feature_map,
+                **known,
                 "target_iuv": iuv,
                 "target_image": lay_over_white(drawn),
             }

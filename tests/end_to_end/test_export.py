@@ -207,7 +207,7 @@ def test_a_format_whose_library_is_missing_is_refused(
 def test_a_file_that_gives_something_else_is_not_published(
     mt, checkpoint: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run, "run_file", lambda _path, _inputs: np.zeros(1))
+    monkeypatch.setattr(run, "run_file", lambda _path, _inputs: [np.zeros(1)])
     result = mt("export", checkpoint, "-o", tmp_path / "new" / "networks", "-q")
     assert result.code == 1
     assert result.err.startswith("mt: encoder.onnx gives ")

@@ -19,6 +19,7 @@ from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
 from motion_transfer.drawing.graphs.whole import (
     CLEARANCE,
+    DETAIL,
     DISTANCE,
     FEATURE_MAP,
     FRAME,
@@ -86,13 +87,14 @@ class GraphEngine(ABC):
         if self.config.reads_photo:  # once per source, and by research variants alone
             from motion_transfer.drawing.engines.torch_engine import encode_source
 
-            return encode_source(load_checkpoint(self._weights), source).numpy()
+            return encode_source(load_checkpoint(self._weights), source)
         clearance = source.clearance
         if clearance is None:
             clearance = np.zeros((CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32)
         named = {TEXTURE: source.texture, VISIBILITY: source.visibility, CLEARANCE: clearance}
         inputs = {name: np.ascontiguousarray(array[None]) for name, array in named.items()}
-        return self._encoder.run(inputs)
+        outputs = self._encoder.run_all(inputs)
+        return FeatureMap(outputs[FEATURE_MAP], outputs.get(DETAIL))
 
     def prepare(self, sides: Collection[int]) -> None:
         for side in sides:
@@ -121,8 +123,10 @@ class GraphEngine(ABC):
     def feature_image(
         self, feature_map: FeatureRows, iuv: UInt8[np.ndarray, "B S S 3"]
     ) -> Float[np.ndarray, "B C S S"]:
-        inputs = ({FEATURE_MAP: feature_map.feature_map, IUV: crop[None]} for crop in iuv)
-        return np.concatenate([self._sampler.run(each) for each in inputs])
+        known = {FEATURE_MAP: feature_map.feature_map.features}
+        if feature_map.feature_map.detail is not None:
+            known[DETAIL] = feature_map.feature_map.detail
+        return np.concatenate([self._sampler.run({**known, IUV: crop[None]}) for crop in iuv])
 
     @cached_property
     def _sampler(self) -> Session:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -22,7 +23,19 @@ LANES = 2
 KEPT_SIZES = 4
 """Of crops, for which an engine stays ready; each takes memory for its activations."""
 
-FeatureMap = Float[np.ndarray, "1 D T T"]
+
+@dataclass(frozen=True, eq=False)
+class FeatureMap:
+    """What a network knows of a source.
+
+    Attributes:
+        features: The paper's feature map, and what is carried with it.
+        detail: What the photos show finer: added to the first three channels where they are looked
+            up, see `nhrr_core.NeuralReRenderer.detail`; None where a model has no use for it.
+    """
+
+    features: Float[np.ndarray, "1 D T T"]
+    detail: Float[np.ndarray, "1 3 t t"] | None = None
 
 
 class Engine(Protocol):

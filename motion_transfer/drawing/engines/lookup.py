@@ -13,6 +13,7 @@ from jaxtyping import Float32, Int32, UInt8
 
 from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.unfolding import chart_entries
+from nhrr_core.config import COLOUR_CHANNELS
 from nhrr_core.uv_tables import load_uv_tables
 
 
@@ -24,21 +25,39 @@ class FeatureRows:
     """
 
     def __init__(self, feature_map: FeatureMap) -> None:
-        self.feature_map = np.ascontiguousarray(feature_map)
-        channels, self._size = feature_map.shape[1], feature_map.shape[-1]
-        self._rows = np.ascontiguousarray(self.feature_map.reshape(channels, -1).T)
+        self.feature_map = feature_map
+        self._features = _Rows(feature_map.features)
+        self._detail = None if feature_map.detail is None else _Rows(feature_map.detail)
 
     def look_up(self, iuv: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "1 H W D"]:
         """Look each pixel up, bilinearly; 0 outside the body, see `nhrr_core.sample_features`."""
-        first, shares = _corners(self._size)
         body = np.flatnonzero(iuv[..., 0])
-        entry = chart_entries(iuv.reshape(-1, 3)[body])
-        corner, right, down = first[entry], *(share[entry, None] for share in shares)
+        entries = chart_entries(iuv.reshape(-1, 3)[body])
+        features = self._features.at(entries)
+        if self._detail is not None:
+            features[:, :COLOUR_CHANNELS] += self._detail.at(entries)
+        looked_up = np.zeros((iuv.shape[0] * iuv.shape[1], features.shape[1]), np.float32)
+        looked_up[body] = features
+        return looked_up.reshape(1, *iuv.shape[:2], -1)
+
+
+class _Rows:
+    """A map of which the channels of a texel lie together."""
+
+    def __init__(self, values: Float32[np.ndarray, "1 C T T"]) -> None:
+        self._size = values.shape[-1]
+        self._rows = np.ascontiguousarray(values.reshape(values.shape[1], -1).T)
+
+    def at(self, entries: Int32[np.ndarray, " N"]) -> Float32[np.ndarray, "N C"]:
+        """Look up, bilinearly, where rows of the flat table of charts say."""
+        first, shares = _corners(self._size)
+        corner, right, down = first[entries], *(share[entries, None] for share in shares)
         above = self._between(corner, right)
         below = self._between(corner + self._size, right)
-        looked_up = np.zeros((iuv.shape[0] * iuv.shape[1], self._rows.shape[1]), np.float32)
-        looked_up[body] = above + (below - above) * down
-        return looked_up.reshape(1, *iuv.shape[:2], -1)
+        below -= above
+        below *= down
+        below += above
+        return below
 
     def _between(
         self, corner: Int32[np.ndarray, " N"], right: Float32[np.ndarray, "N 1"]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection
 from copy import deepcopy
 from pathlib import Path
 from queue import Queue
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -20,7 +21,7 @@ from motion_transfer.drawing.source import Source, cut_source
 from motion_transfer.errors import InputError
 from motion_transfer.weights.checkpoint import load_checkpoint
 from nhrr_core import ModelConfig, NeuralReRenderer
-from nhrr_core.config import IUV_CHANNELS
+from nhrr_core.config import COLOUR_CHANNELS, IUV_CHANNELS
 
 CPU_BATCH = 4
 BATCHES = (48, 24, 16, 12, 8, 6, 4, 3, 2, 1)  # divisors of a chunk's length, which is 48
@@ -79,17 +80,22 @@ class TorchEngine:
         return self._batches[side]
 
     def encode(self, source: Source) -> FeatureMap:
-        return encode_source(self._model, source).numpy()
+        return encode_source(self._model, source)
 
     def prepare(self, sides: Collection[int]) -> None:
         for side in sides if self._on_cuda else ():
             self._lanes_of(side)
 
-    def take(self, feature_map: FeatureMap) -> Tensor:
-        return torch.from_numpy(feature_map).to(self._device)
+    def take(self, feature_map: FeatureMap) -> Known:
+        given = (feature_map.features, feature_map.detail)
+        features, detail = (
+            None if each is None else torch.from_numpy(each).to(self._device) for each in given
+        )
+        assert features is not None
+        return Known(features, detail)
 
     def draw(
-        self, feature_map: Tensor, iuv: UInt8[np.ndarray, "B S S 3"]
+        self, feature_map: Known, iuv: UInt8[np.ndarray, "B S S 3"]
     ) -> UInt8[np.ndarray, "B S S K"]:
         side = iuv.shape[1]
         if not self._on_cuda or len(iuv) != self.batch_size(side):
@@ -103,16 +109,18 @@ class TorchEngine:
             lanes.put(lane)
 
     def feature_image(
-        self, feature_map: Tensor, iuv: UInt8[np.ndarray, "B S S 3"]
+        self, feature_map: Known, iuv: UInt8[np.ndarray, "B S S 3"]
     ) -> Float[np.ndarray, "B C S S"]:
         with torch.inference_mode():
             target = torch.from_numpy(iuv).to(self._device).permute(0, 3, 1, 2)
-            return self._model.feature_image(feature_map, target).float().cpu().numpy()
+            features = self._model.feature_image(feature_map.features, target, feature_map.detail)
+            return features.float().cpu().numpy()
 
-    def _frames(self, feature_map: Tensor, iuv: Tensor) -> Tensor:
+    def _frames(self, known: Known, iuv: Tensor) -> Tensor:
         """Draw B x S x S x 3 uint8 as B x S x S x K uint8, where they lie."""
         with torch.inference_mode():
-            features = self._model.feature_image(feature_map, iuv.permute(0, 3, 1, 2))
+            target = iuv.permute(0, 3, 1, 2)
+            features = self._model.feature_image(known.features, target, known.detail)
             drawn = self._net(features.to(self._dtype, memory_format=torch.channels_last)).float()
             frame = self._model.blend(drawn, features)
             levels = ((frame + 1) * 127.5).round().clamp(0, 255).to(torch.uint8)
@@ -131,6 +139,13 @@ class TorchEngine:
             return self._lanes[side]
 
 
+class Known(NamedTuple):
+    """A `FeatureMap` where it is read."""
+
+    features: Tensor
+    detail: Tensor | None
+
+
 class _CudaLane:
     """One of several ways through a CUDA device: while one computes, another copies.
 
@@ -140,38 +155,43 @@ class _CudaLane:
 
     def __init__(
         self,
-        frames: Callable[[Tensor, Tensor], Tensor],
+        frames: Callable[[Known, Tensor], Tensor],
         config: ModelConfig,
         batch: int,
         side: int,
         device: torch.device,
     ) -> None:
-        texels = config.finest_texture
+        texels, finest = config.texture_size, config.finest_texture
         self._stream = torch.cuda.Stream(device)
-        self._shown: Tensor | None = None
+        self._shown: Known | None = None
         self._host_iuv = pinned((batch, side, side, IUV_CHANNELS))
         self._host_frames = pinned((batch, side, side, config.render_outputs))
         self._iuv = torch.zeros_like(self._host_iuv, device=device)
-        self._map = torch.zeros((1, config.map_channels, texels, texels), device=device)
+        self._known = Known(
+            torch.zeros((1, config.map_channels, texels, texels), device=device),
+            torch.zeros((1, COLOUR_CHANNELS, finest, finest), device=device)
+            if config.has_detail
+            else None,
+        )
         self._graph = torch.cuda.CUDAGraph()
         torch.cuda.synchronize(device)
         with torch.cuda.stream(self._stream):  # as recording asks for: once before, aside
-            frames(self._map, self._iuv)
+            frames(self._known, self._iuv)
         self._stream.synchronize()
         # other threads may be drawing crops of another size meanwhile
         mode = "thread_local"
         with torch.cuda.graph(self._graph, stream=self._stream, capture_error_mode=mode):
-            self._frames = frames(self._map, self._iuv)
+            self._frames = frames(self._known, self._iuv)
 
-    def draw(
-        self, feature_map: Tensor, iuv: UInt8[np.ndarray, "B S S 3"]
-    ) -> UInt8[np.ndarray, "B S S K"]:
+    def draw(self, known: Known, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S K"]:
         """Draw a batch; waits for the device without Python's lock."""
         self._host_iuv.numpy()[:] = iuv
         with torch.cuda.stream(self._stream):
-            if self._shown is not feature_map:
-                self._map.copy_(feature_map)
-                self._shown = feature_map
+            if self._shown is not known:
+                for own, given in zip(self._known, known, strict=True):
+                    if own is not None and given is not None:
+                        own.copy_(given)
+                self._shown = known
             self._iuv.copy_(self._host_iuv, non_blocking=True)
             self._graph.replay()
             self._host_frames.copy_(self._frames, non_blocking=True)
@@ -194,8 +214,8 @@ def choose_batch(config: ModelConfig, side: int, free_bytes: int) -> int:
     return next(batch for batch in BATCHES if batch <= fitting)
 
 
-def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
-    """Compute a source's feature map, 1 x D x T x T, where the model lies; return it on the CPU.
+def encode_source(model: NeuralReRenderer, source: Source) -> FeatureMap:
+    """Compute a source's feature map, where the model lies.
 
     Measured: FeatureNet's last bits depend on the number of threads, so it gets one, wherever it
     runs; RenderNet's do not.
@@ -210,7 +230,9 @@ def encode_source(model: NeuralReRenderer, source: Source) -> Tensor:
     pictures = cut_pictures(source, model.config)
     with one_torch_thread(), torch.inference_mode():
         shown = None if pictures is None else torch.from_numpy(pictures)[None].to(device)
-        return model.encode_texture(texture, visibility, clearance, shown).cpu()
+        features = model.encode_texture(texture, visibility, clearance, shown).cpu().numpy()
+        detail = model.detail(texture, visibility)
+        return FeatureMap(features, None if detail is None else detail.cpu().numpy())
 
 
 def cut_pictures(source: Source, config: ModelConfig) -> UInt8[np.ndarray, "P 6 S S"] | None:

@@ -11,6 +11,7 @@ import onnx
 from motion_transfer.drawing.export.formats import Network
 from motion_transfer.drawing.graphs.whole import (
     CLEARANCE,
+    DETAIL,
     FEATURE_MAP,
     FEATURES,
     FRAME,
@@ -33,6 +34,7 @@ MEANINGS = {
     CLEARANCE: "how far clothes and hair stand off the body, and 1 where that is known, else 0;"
     " all 0 where nothing is",
     FEATURE_MAP: "what the encoder gives, in the layout of the texture",
+    DETAIL: "what it gives besides: colours that are finer than the feature map",
     IUV: "target IUV: the part, 1 to 24, 0 for the background; U and V, [0, 1] scaled by 255",
     FEATURES: "what RenderNet reads",
     FRAME: "the picture, {channels}, 0 to 255",

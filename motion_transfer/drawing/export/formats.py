@@ -51,8 +51,8 @@ def write_openvino(network: Network, path: Path) -> None:
     openvino.save_model(graph, path, compress_to_fp16=network.precision == "bf16")
 
 
-def run_file(path: Path, inputs: Arrays) -> np.ndarray:
-    """Give the output of an .onnx or .xml file.
+def run_file(path: Path, inputs: Arrays) -> list[np.ndarray]:
+    """Give the outputs of an .onnx or .xml file.
 
     ONNX Runtime runs the former where it is installed, OpenVINO all others.
     """
@@ -62,14 +62,14 @@ def run_file(path: Path, inputs: Arrays) -> np.ndarray:
 
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     read = {port.name: inputs[port.name] for port in session.get_inputs()}
-    return np.asarray(session.run(None, read)[0])
+    return [np.asarray(output) for output in session.run(None, read)]
 
 
-def run_openvino(model: Path | bytes, inputs: Arrays) -> np.ndarray:
-    """Give the output of a graph, computed by OpenVINO in float32."""
+def run_openvino(model: Path | bytes, inputs: Arrays) -> list[np.ndarray]:
+    """Give the outputs of a graph, computed by OpenVINO in float32."""
     core = openvino.Core()
     exact = {"INFERENCE_PRECISION_HINT": "f32"}
     compiled = core.compile_model(core.read_model(model), "CPU", exact)
     # what nothing reads is no input any more
     read = {port.get_any_name(): inputs[port.get_any_name()] for port in compiled.inputs}
-    return compiled(read)[0]
+    return list(compiled(read).values())

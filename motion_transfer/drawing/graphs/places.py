@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -10,7 +11,14 @@ from jaxtyping import Float32
 from motion_transfer.drawing.graphs.graph import FLOAT, INT32, INT64, Graph
 from motion_transfer.drawing.graphs.networks import enlarge
 from motion_transfer.drawing.textures import pick_nearest, twins
-from nhrr_core.config import CLEARANCE_SIZE, FILL_FROM, FILL_METRES, FILL_TO, PLACE_METRES
+from nhrr_core.config import (
+    CLEARANCE_SIZE,
+    COLOUR_CHANNELS,
+    FILL_FROM,
+    FILL_METRES,
+    FILL_TO,
+    PLACE_METRES,
+)
 from nhrr_core.uv_tables import CHART_SIZE, UVTables, load_uv_tables
 
 TINY = 1e-6  # far below the smallest weight that is not 0, a sixteenth
@@ -103,16 +111,26 @@ def texel_positions(size: int) -> Float32[np.ndarray, "1 3 T T"]:
     return np.ascontiguousarray(places[None])
 
 
-def look_up(graph: Graph, feature_map: str, iuv: str) -> tuple[str, str]:
+def look_up(
+    graph: Graph, feature_map: str, iuv: str, channels: int, detail: str | None = None
+) -> tuple[str, str]:
     """Look each pixel up in a feature map, see `nhrr_core.sample_features`.
 
     Args:
         feature_map: 1 x D x T x T.
         iuv: 1 x H x W x 3 uint8.
+        channels: D.
+        detail: What is added to the first three channels, 1 x 3 x t x t.
     Returns: The features, 1 x D x H x W, 0 outside the body; and the body, 1 x 1 x H x W, 1 or 0.
     """
     grid = graph("Sub", graph("Mul", _find_places(graph, iuv), 2), 1)
-    sampled = graph("GridSample", feature_map, grid, mode="bilinear", padding_mode="border")
+    places: dict[str, Any] = {"mode": "bilinear", "padding_mode": "border"}
+    sampled = graph("GridSample", feature_map, grid, **places)
+    if detail is not None:
+        finer = graph("GridSample", detail, grid, **places)
+        colours = graph("Add", graph.part(sampled, 0, COLOUR_CHANNELS), finer)
+        others = [graph.part(sampled, COLOUR_CHANNELS, channels)] * (channels > COLOUR_CHANNELS)
+        sampled = graph.join(colours, *others)
     part = graph("Gather", iuv, np.array(0), axis=3)
     body = graph("Cast", graph("Unsqueeze", part, np.array([1])), to=FLOAT)
     body = graph("Min", body, 1)

@@ -39,23 +39,26 @@ from nhrr_core.config import (
 )
 from nhrr_core.parts import PART_COUNT
 
-TEXTURE, VISIBILITY, CLEARANCE, FEATURE_MAP = "texture", "visibility", "clearance", "feature_map"
+TEXTURE, VISIBILITY, CLEARANCE = "texture", "visibility", "clearance"
+FEATURE_MAP, DETAIL = "feature_map", "detail"
 IUV, FEATURES, FRAME = "iuv", "features", "frame"
 SAMPLED, DISTANCE, UNIT = "sampled", "distance", "unit"
 
 
 def build_encoder(config: ModelConfig, weights: Weights) -> onnx.ModelProto:
-    """Build what `NeuralReRenderer.encode_texture` computes.
+    """Build what `NeuralReRenderer.encode_texture` and `detail` compute.
 
-    Inputs: `texture`, 1 x 3 x T x T in [-1, 1], 0 where nothing is seen, T being
-    `config.finest_texture`; `visibility`, 1 x 1 x T x T, 1 or 0; with `config.clearance`
-    `clearance`, 1 x 2 x 128 x 128, 0 where it is not known. Output: `feature_map`, 1 x D x T x T.
+    Inputs: `texture`, 1 x 3 x t x t in [-1, 1], 0 where nothing is seen, t being
+    `config.finest_texture`; `visibility`, 1 x 1 x t x t, 1 or 0; with `config.clearance`
+    `clearance`, 1 x 2 x 128 x 128, 0 where it is not known. Outputs: `feature_map`, 1 x D x T x T,
+    T being `config.texture_size`; with `config.has_detail` `detail`, 1 x 3 x t x t.
     """
     graph = Graph()
-    size = config.finest_texture
-    texture = graph.input(TEXTURE, FLOAT, (1, COLOUR_CHANNELS, size, size))
-    visibility = graph.input(VISIBILITY, FLOAT, (1, 1, size, size))
-    carried = [_complete(graph, texture, visibility, config, weights)]
+    finest, size = config.finest_texture, config.texture_size
+    texture = graph.input(TEXTURE, FLOAT, (1, COLOUR_CHANNELS, finest, finest))
+    visibility = graph.input(VISIBILITY, FLOAT, (1, 1, finest, finest))
+    completed, detail = _complete(graph, texture, visibility, config, weights)
+    carried = [completed]
     if config.clearance:
         shape = (1, CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE)
         clearance = graph.input(CLEARANCE, FLOAT, shape)
@@ -67,15 +70,20 @@ def build_encoder(config: ModelConfig, weights: Weights) -> onnx.ModelProto:
     if config.geometry:
         carried.append(graph.constant(texel_positions(size)))
     graph.output(FEATURE_MAP, graph.join(*carried), FLOAT, (1, config.map_channels, size, size))
+    if detail is not None:
+        graph.output(DETAIL, detail, FLOAT, (1, COLOUR_CHANNELS, finest, finest))
     return graph.build("encoder")
 
 
 def _complete(
     graph: Graph, texture: str, visibility: str, config: ModelConfig, weights: Weights
-) -> str:
-    """Append what `NeuralReRenderer` does to a texture; returns the learned features."""
+) -> tuple[str, str | None]:
+    """Append what `NeuralReRenderer` does to a texture.
+
+    Returns: The learned features; and what the texture shows finer, where that is wanted.
+    """
     if not config.has_feature_net:
-        return texture
+        return texture, None
     factor = config.finest_texture // config.texture_size
     coarse, seen = texture, visibility
     if factor > 1:
@@ -87,15 +95,16 @@ def _complete(
     own = _read_by_feature_net(graph, coarse, seen, config, weights)
     features = append_feature_net(graph, graph.join(*own), weights)
     if not config.colour_shortcut:
-        return features
-    carried = own[0]
-    if factor > 1:
-        features, carried = (enlarge(graph, each, factor) for each in (features, carried))
-        carried = graph("Where", graph("Greater", visibility, 0), texture, carried)
-    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), carried)
+        return features, None
+    detail = None
+    if config.has_detail:
+        finer = graph("Sub", texture, enlarge(graph, own[0], factor))
+        detail = graph("Mul", finer, visibility)
+    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), own[0])
     if config.feature_outputs == COLOUR_CHANNELS:
-        return colours
-    return graph.join(colours, graph.part(features, COLOUR_CHANNELS, config.feature_outputs))
+        return colours, detail
+    others = graph.part(features, COLOUR_CHANNELS, config.feature_outputs)
+    return graph.join(colours, others), detail
 
 
 def _read_by_feature_net(
@@ -117,8 +126,8 @@ def _read_by_feature_net(
 def build_sampler(config: ModelConfig) -> onnx.ModelProto:
     """Build what `NeuralReRenderer.feature_image` computes.
 
-    Inputs: `feature_map`, 1 x D x T x T; `iuv`, 1 x H x W x 3 uint8 (I, U, V). Output: `features`,
-    1 x C x H x W, which RenderNet reads.
+    Inputs: `feature_map`, 1 x D x T x T; with `config.has_detail` `detail`, 1 x 3 x t x t; `iuv`,
+    1 x H x W x 3 uint8 (I, U, V). Output: `features`, 1 x C x H x W, which RenderNet reads.
     """
     graph = Graph()
     _map_input(graph, config)
@@ -138,16 +147,17 @@ def build_painter(
 ) -> onnx.ModelProto:
     """Build what `NeuralReRenderer.render` computes, from target IUV to a frame of 8 bits.
 
-    Inputs: `feature_map`, 1 x D x T x T; `iuv`, 1 x H x W x 3 uint8 (I, U, V), H and W multiples
-    of 2**down_blocks. Output: `frame`, 1 x H x W x K uint8, RGB and alpha where the model has it.
+    Inputs: `feature_map`, 1 x D x T x T; with `config.has_detail` `detail`, 1 x 3 x t x t; `iuv`,
+    1 x H x W x 3 uint8 (I, U, V), H and W multiples of 2**down_blocks. Output: `frame`,
+    1 x H x W x K uint8, RGB and alpha where the model has it.
 
     Args:
         ranges: Makes RenderNet's convolutions ones of 8-bit numbers.
-        looked_up: Whether `sampled`, 1 x H x W x D, the feature map as the pixels see it, is an
-            input in place of the map; with `config.geometry` also `distance`, 1 x 1 x H x W, that
-            to the outline, and with `config.clearance` `unit`, 1 x 1 x 1 x 1, what a clearance of 1
-            is in the image. Whoever knows where the body is finds them several times as fast as a
-            graph.
+        looked_up: Whether `sampled`, 1 x H x W x D, the feature map as the pixels see it, with its
+            detail, is an input in place of both; with `config.geometry` also `distance`,
+            1 x 1 x H x W, that to the outline, and with `config.clearance` `unit`, 1 x 1 x 1 x 1,
+            what a clearance of 1 is in the image. Whoever knows where the body is finds them
+            several times as fast as a graph.
         taps: Whether what RenderNet's convolutions read is given out as well, by the names of their
             weights.
     """
@@ -174,8 +184,10 @@ def build_painter(
 
 
 def _map_input(graph: Graph, config: ModelConfig) -> None:
-    size = config.finest_texture
+    size, finest = config.texture_size, config.finest_texture
     graph.input(FEATURE_MAP, FLOAT, (1, config.map_channels, size, size))
+    if config.has_detail:
+        graph.input(DETAIL, FLOAT, (1, COLOUR_CHANNELS, finest, finest))
 
 
 def _iuv_input(graph: Graph) -> str:
@@ -207,7 +219,8 @@ def _append_sampler(
         body = graph("Cast", inside, to=FLOAT)
         distance, unit = DISTANCE, UNIT
     else:
-        sampled, body = look_up(graph, FEATURE_MAP, iuv)
+        detail = DETAIL if config.has_detail else None
+        sampled, body = look_up(graph, FEATURE_MAP, iuv, config.map_channels, detail)
         distance = signed_distance(graph, body, OUTLINE_PIXELS) if config.geometry else ""
         unit = ""
     learned, end = config.appearance_channels, config.map_channels

@@ -8,10 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 from jaxtyping import Float, Shaped, UInt8
 
-from motion_transfer.drawing.engines.interface import Occupied
+from motion_transfer.drawing.engines.interface import FeatureMap, Occupied
 from motion_transfer.drawing.source import Source
 
-Appearance = Shaped[np.ndarray, "..."]
+Appearance = FeatureMap | Shaped[np.ndarray, "..."]
 """What a renderer knows of a source: the network's feature map, or the table of its texture."""
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.engines import Execution, Wish, choose_execution, open_engine
-from motion_transfer.drawing.engines.interface import Engine, Occupied
+from motion_transfer.drawing.engines.interface import Engine, FeatureMap, Occupied
 from motion_transfer.drawing.kept_source import load_features
 from motion_transfer.drawing.person import disc, occupancy
 from motion_transfer.drawing.renderers.interface import Appearance
@@ -77,16 +77,15 @@ class NetworkRecipe:
     def make_ready(self, window_sides: Collection[int]) -> None:
         _open_network(self).prepare({self.working_size(side) for side in window_sides})
 
-    def appearance_of(self, source: Source) -> Appearance:
+    def appearance_of(self, source: Source) -> FeatureMap:
         if source.kept is not None:
             config = inspect_checkpoint(self.weights).config
-            side = config.finest_texture
-            shape = (1, config.map_channels, side, side)
-            if (kept := load_features(source.kept, self.content, shape)) is not None:
+            if (kept := load_features(source.kept, self.content, config)) is not None:
                 return kept
         return _open_network(self).encode(source)
 
     def renderer(self, appearance: Appearance) -> NeuralRenderer:
+        assert isinstance(appearance, FeatureMap)
         return NeuralRenderer(_open_network(self), appearance)
 
 
@@ -129,7 +128,7 @@ class NeuralRenderer:
 
     name = "nhrr"
 
-    def __init__(self, engine: Engine, appearance: Appearance) -> None:
+    def __init__(self, engine: Engine, appearance: FeatureMap) -> None:
         self._engine = engine
         self._feature_map = engine.take(appearance)
         self.occupies: Occupied = engine.occupies

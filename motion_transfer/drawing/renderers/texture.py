@@ -56,6 +56,7 @@ class TextureRecipe:
         return tabulate_texture(source)
 
     def renderer(self, appearance: Appearance) -> TextureRenderer:
+        assert isinstance(appearance, np.ndarray)
         return TextureRenderer(appearance)
 
 

@@ -25,6 +25,7 @@ from nhrr_core import (
 )
 from nhrr_core.clearance import pixels_per_texel
 from nhrr_core.config import (
+    DETAIL_FACTOR,
     MARGIN_LEVELS,
     OUTLINE_PIXELS,
     PHOTO_FEATURES,
@@ -186,16 +187,38 @@ def test_a_finer_texture_keeps_its_detail(photo: Tensor, iuv: Tensor) -> None:
     torch.manual_seed(0)
     model = small(colour_shortcut=True)
     assert model.feature_net is not None
-    size = model.config.finest_texture
-    assert size == 2 * model.config.texture_size
+    size, factor = model.config.finest_texture, DETAIL_FACTOR
+    assert size == factor * model.config.texture_size
     fine, visibility = extract_texture(photo, iuv, model.charts, size)
-    coarse = torch.cat(shrink_texture(fine, visibility, 2), dim=1)
-    change = nn.functional.interpolate(model.feature_net(coarse), size=size, mode="bilinear")
-    found, seen = model.encode_texture(fine, visibility), visibility[:, 0] > 0
-    where = seen[:, None].expand_as(fine)
-    assert torch.allclose(found[:, :3][where], (change[:, :3] + fine)[where], atol=1e-6)
-    assert torch.allclose(found[:, 3:], change[:, 3:], atol=1e-6)
+    coarse = torch.cat(shrink_texture(fine, visibility, factor), dim=1)
+    change = model.feature_net(coarse)
+    found, detail = model.encode_texture(fine, visibility), model.detail(fine, visibility)
+    assert detail is not None
+    assert torch.equal(found, change + nn.functional.pad(coarse[:, :3], (0, 0, 0, 0, 0, 13)))
+    # together they are what the photo shows, and what FeatureNet changes
+    where = (visibility > 0).expand_as(fine)
+    shown = detail + nn.functional.interpolate(
+        found[:, :3] - change[:, :3], size=size, mode="bilinear"
+    )
+    assert torch.allclose(shown[where], fine[where], atol=1e-6)
+    assert not detail[~where].any(), "what is hidden has none"
+    assert model.detail(*shrink_texture(fine, visibility, factor)) is None
     assert small().config.finest_texture == small().config.texture_size
+    assert small().detail(fine, visibility) is None
+
+
+def test_detail_is_looked_up_beside_the_map(targets: Tensor) -> None:
+    model = small(colour_shortcut=True, geometry=True)
+    feature_map = torch.rand(1, model.config.map_channels, 64, 64)
+    detail = torch.rand(1, 3, 256, 256)
+    plain = model.feature_image(feature_map, targets)
+    image = model.feature_image(feature_map, targets, detail)
+    added = sample_features(detail, targets, model.charts)
+    assert torch.allclose(image[:, :3], plain[:, :3] + added, atol=1e-6)
+    assert torch.equal(image[:, 3:], plain[:, 3:])
+    assert not torch.equal(
+        model.render(feature_map, targets), model.render(feature_map, targets, detail)
+    )
 
 
 def test_what_a_finer_texture_hides_is_filled_smoothly(photo: Tensor, iuv: Tensor) -> None:
@@ -204,16 +227,18 @@ def test_what_a_finer_texture_hides_is_filled_smoothly(photo: Tensor, iuv: Tenso
     assert model.feature_net is not None
     torch.nn.init.zeros_(model.feature_net.exit.weight)
     torch.nn.init.zeros_(model.feature_net.exit.bias)
-    fine, visibility = extract_texture(photo, iuv, model.charts, 128)
-    coarse, seen = shrink_texture(fine, visibility, 2)
+    fine, visibility = extract_texture(photo, iuv, model.charts, 256)
+    coarse, seen = shrink_texture(fine, visibility, 4)
     layout = load_uv_layout()
     mirrored, shown = mirror_texture(coarse, seen, layout.side_twin, layout.depth_twin)
     filled = fill_texture(mirrored, shown, layout.position, measure_surroundings(layout.position))
-    smooth = nn.functional.interpolate(filled, scale_factor=2, mode="bilinear")
-    found = model.encode_texture(fine, visibility)[:, :3]
-    assert torch.allclose(found, torch.where(visibility > 0, fine, smooth), atol=1e-6)
+    found, detail = model.encode_texture(fine, visibility)[:, :3], model.detail(fine, visibility)
+    assert detail is not None
+    assert torch.equal(found, filled)
+    smooth = nn.functional.interpolate(filled, scale_factor=4, mode="bilinear")
+    assert torch.allclose(smooth + detail, torch.where(visibility > 0, fine, smooth), atol=1e-6)
     assert (visibility == 0).any()
-    assert (found != 0).all(dim=1)[visibility[:, 0] == 0].any(), "what is hidden has colours"
+    assert (smooth != 0).all(dim=1)[visibility[:, 0] == 0].any(), "what is hidden has colours"
 
 
 @pytest.mark.parametrize("alpha", [False, True])

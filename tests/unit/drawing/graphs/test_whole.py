@@ -9,6 +9,7 @@ import openvino
 import pytest
 import torch
 
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
 from motion_transfer.drawing.graphs.whole import build_encoder, build_painter, build_sampler
@@ -106,26 +107,42 @@ def target(height: int, width: int) -> np.ndarray:
     return iuv
 
 
+def noise(config: ModelConfig) -> dict[str, torch.Tensor]:
+    """A feature map, and detail where the model has a use for it."""
+    side, finest = config.texture_size, config.finest_texture
+    known = {"feature_map": torch.randn(1, config.map_channels, side, side)}
+    if config.has_detail:
+        known["detail"] = torch.randn(1, 3, finest, finest) / 2
+    return known
+
+
+def arrays(tensors: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
+    return {name: tensor.numpy() for name, tensor in tensors.items()}
+
+
 @each
 def test_the_encoder_is_torchs(changes: dict[str, Any]) -> None:
     model = make(changes)
     inputs = seen_texture(model.config)
-    (feature_map,) = run(build_encoder(model.config, weights_of(model)), inputs)
+    found = run(build_encoder(model.config, weights_of(model)), inputs)
+    texture, visibility, clearance = map(torch.from_numpy, inputs.values())
     with torch.no_grad():
-        expected = model.encode_texture(*map(torch.from_numpy, inputs.values()))
-    np.testing.assert_allclose(feature_map, expected.numpy(), rtol=0, atol=1e-4)
+        expected = [model.encode_texture(texture, visibility, clearance)]
+        detail = model.detail(texture, visibility)
+    assert (detail is not None) == model.config.has_detail
+    expected += [] if detail is None else [detail]
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other.numpy(), rtol=0, atol=1e-4)
 
 
 @each
 def test_the_sampler_is_torchs(changes: dict[str, Any]) -> None:
-    model = make(changes)
-    side = model.config.finest_texture
-    feature_map = torch.randn(1, model.config.map_channels, side, side)
-    iuv = target(40, 56)
-    inputs = {"feature_map": feature_map.numpy(), "iuv": iuv}
-    (features,) = run(build_sampler(model.config), inputs)
+    model, iuv = make(changes), target(40, 56)
+    known = noise(model.config)
+    (features,) = run(build_sampler(model.config), arrays(known) | {"iuv": iuv})
     with torch.no_grad():
-        expected = model.feature_image(feature_map, torch.from_numpy(iuv).permute(0, 3, 1, 2))
+        target_iuv = torch.from_numpy(iuv).permute(0, 3, 1, 2)
+        expected = model.feature_image(**known, target_iuv=target_iuv)
     np.testing.assert_allclose(features, expected.numpy(), rtol=0, atol=1e-4)
 
 
@@ -133,12 +150,11 @@ def test_the_sampler_is_torchs(changes: dict[str, Any]) -> None:
 @pytest.mark.parametrize("iuv", [target(40, 56), target(64, 32), target(48, 48) * NARROW], ids=len)
 def test_the_painter_is_torchs(changes: dict[str, Any], iuv: np.ndarray) -> None:
     model = make(changes)
-    side = model.config.finest_texture
-    feature_map = torch.randn(1, model.config.map_channels, side, side)
-    inputs = {"feature_map": feature_map.numpy(), "iuv": iuv}
+    known = noise(model.config)
+    inputs = arrays(known) | {"iuv": iuv}
     (frame,) = run(build_painter(model.config, weights_of(model)), inputs)
     with torch.no_grad():
-        drawn = model.render(feature_map, torch.from_numpy(iuv).permute(0, 3, 1, 2))
+        drawn = model.render(**known, target_iuv=torch.from_numpy(iuv).permute(0, 3, 1, 2))
     expected = ((drawn + 1) * 127.5).permute(0, 2, 3, 1).numpy()
     assert np.abs(frame - expected).max() < 0.51
 
@@ -146,11 +162,11 @@ def test_the_painter_is_torchs(changes: dict[str, Any], iuv: np.ndarray) -> None
 @each
 def test_the_painter_may_be_given_what_is_looked_up(changes: dict[str, Any]) -> None:
     model, iuv = make(changes), target(40, 56)
-    config, side = model.config, model.config.finest_texture
-    feature_map = np.random.default_rng(2).normal(size=(1, config.map_channels, side, side))
-    rows = FeatureRows(feature_map.astype(np.float32))
+    config = model.config
+    known = arrays(noise(config))
+    rows = FeatureRows(FeatureMap(known["feature_map"], known.get("detail")))
     inputs = {
-        "feature_map": rows.feature_map,
+        **known,
         "iuv": iuv,
         "sampled": rows.look_up(iuv[0]),
         "distance": signed_distance(iuv[0])[None, None],
