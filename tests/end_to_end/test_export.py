@@ -15,6 +15,7 @@ import pytest
 
 from motion_transfer.cores import sums_bytes
 from motion_transfer.drawing.engines import Execution, open_engine
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.engines.openvino_engine import OpenVinoEngine
 from motion_transfer.drawing.export import run
 from motion_transfer.drawing.export.options import FORMATS
@@ -41,7 +42,8 @@ def ranged(
 ) -> Path:
     """The checkpoint, with what its convolutions read of noise."""
     engine = OpenVinoEngine(checkpoint, Execution("openvino", "f32", "cpu"))
-    read = engine.read_by_convolutions(noise["feature_map"], noise["iuv"][0])
+    known = FeatureMap(noise["feature_map"])
+    read = engine.read_by_convolutions(known, noise["iuv"][0])
     ranges = {name: (float(each.min()), float(each.max())) for name, each in read.items()}
     path = tmp_path_factory.mktemp("weights") / "ranged.safetensors"
     copy_with_notes(checkpoint, path, {RANGES: json.dumps(ranges)})
@@ -74,7 +76,7 @@ def compute(file: Path | bytes, inputs: dict[str, np.ndarray]) -> np.ndarray:
 def draw_exactly(weights: Path, inputs: dict[str, np.ndarray]) -> np.ndarray:
     """The frame that torch draws, which is the specification."""
     engine = open_engine(weights, Execution("torch", "f32", "cpu"))
-    return engine.draw(engine.take(inputs["feature_map"]), inputs["iuv"])
+    return engine.draw(engine.take(FeatureMap(inputs["feature_map"])), inputs["iuv"])
 
 
 def levels_off(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -112,6 +114,36 @@ def test_encoder_and_sampler_are_torchs(exported: Path, checkpoint: Path, noise)
         np.testing.assert_allclose(found, feature_map, rtol=0, atol=1e-4)
         found = compute(exported / f"sampler{ending}", noise)
         np.testing.assert_allclose(found, features, rtol=0, atol=1e-4)
+
+
+def test_what_is_finer_than_the_map_is_given_and_read(mt, tmp_path: Path) -> None:
+    import torch
+
+    from motion_transfer.weights.checkpoint import save_checkpoint
+    from nhrr_core import ModelConfig, NeuralReRenderer
+
+    torch.manual_seed(0)
+    small = {"feature_width": 4, "render_width": 4, "residual_blocks": 1, "texture_size": 32}
+    model = NeuralReRenderer(ModelConfig.preset("lite", image_size=64, **small)).eval()
+    save_checkpoint(tmp_path / "lite.safetensors", model)
+    folder = tmp_path / "networks"
+    assert mt("export", tmp_path / "lite.safetensors", "-o", folder, "-q").code == 0
+    networks = json.loads((folder / "model.json").read_text())["networks"]
+    gives = {name: each["shape"] for name, each in networks["encoder"]["outputs"].items()}
+    assert gives == {"feature_map": [1, 21, 32, 32], "detail": [1, 3, 128, 128]}
+    inputs = run.make_noise(model.config)
+    frames = [
+        compute(folder / "painter-f32.onnx", {**inputs, "detail": inputs["detail"] * share})
+        for share in (0, 1)
+    ]
+    with torch.inference_mode():
+        known, detail, iuv = (
+            torch.from_numpy(inputs[name]) for name in ("feature_map", "detail", "iuv")
+        )
+        drawn = model.render(known, iuv.permute(0, 3, 1, 2), detail)
+    expected = ((drawn + 1) * 127.5).permute(0, 2, 3, 1).numpy()
+    assert np.abs(frames[1] - expected).max() < 0.6
+    assert levels_off(*frames).max() > 8
 
 
 def test_bf16_is_stored_in_half(mt, checkpoint: Path, tmp_path: Path, noise) -> None:

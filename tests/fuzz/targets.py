@@ -20,6 +20,7 @@ from reference import densepose_dump
 
 from fuzz import mutations
 from motion_transfer.batch.run import check_batch, read_batch
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.kept_source import (
     inspect_source,
     load_features,
@@ -262,13 +263,16 @@ def _kept_sources(folder: Path) -> Iterator[Path]:
     photo = Photo(folder / "p.png", Studio(folder).dress(Studio(folder).iuv()), None, turned=False)
     source = unfold_source([SourcePicture(photo, Studio(folder).iuv())], 32)
     path = folder / "me.mtsource"
-    save_source(path, [source], {"0" * 64: np.zeros((1, 4, 32, 32), np.float32)}, {"made of": []})
+    known = FeatureMap(np.zeros((1, 4, 32, 32), np.float32), np.zeros((1, 3, 128, 128), np.float32))
+    save_source(path, [source], {"0" * 64: known}, {"made of": []})
     yield path
 
 
 def _read_kept(path: Path) -> None:
     load_source(path, 32)
-    load_features(path, "0" * 64, (1, 4, 32, 32))
+    load_features(
+        path, "0" * 64, ModelConfig(feature_channels=4, texture_size=32, colour_shortcut=True)
+    )
     inspect_source(path)
 
 

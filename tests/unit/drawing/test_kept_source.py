@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
+from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.kept_source import (
     FACTS,
     FORMAT,
@@ -26,10 +27,12 @@ from motion_transfer.drawing.renderers import RENDERERS
 from motion_transfer.drawing.source import Source, undress
 from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import Photo
-from nhrr_core import load_uv_tables
+from nhrr_core import ModelConfig, load_uv_tables
+from nhrr_core.config import DETAIL_FACTOR
 
 SIZE, COARSE, HEIGHT, WIDTH = 64, 16, 30, 20
-DIGEST, MAP = "ab" * 32, (1, 5, SIZE, SIZE)
+DIGEST = "ab" * 32
+CONFIG = ModelConfig(feature_channels=5, texture_size=SIZE // DETAIL_FACTOR, colour_shortcut=True)
 MADE_OF = [{"file": "me.jpg", "sha256": "cd" * 32}]
 
 
@@ -51,14 +54,26 @@ def make_source(size: int = SIZE, *, alpha: bool = True) -> Source:
     )
 
 
-def make_features() -> dict[str, np.ndarray]:
-    return {DIGEST: np.random.default_rng(1).standard_normal(MAP, np.float32)}
+def make_maps(config: ModelConfig = CONFIG) -> dict[str, FeatureMap]:
+    noise, side = np.random.default_rng(1), config.texture_size
+    features = noise.standard_normal((1, 5, side, side), np.float32)
+    detail = noise.standard_normal((1, 3, SIZE, SIZE), np.float32) if config.has_detail else None
+    return {DIGEST: FeatureMap(features, detail)}
+
+
+def assert_equal(one: FeatureMap | None, other: FeatureMap) -> None:
+    assert one is not None
+    np.testing.assert_array_equal(one.features, other.features)
+    if other.detail is None:
+        assert one.detail is None
+    else:
+        np.testing.assert_array_equal(one.detail, other.detail)
 
 
 @pytest.fixture
 def kept(tmp_path: Path) -> Path:
     path = tmp_path / "me.mtsource"
-    save_source(path, [make_source(), make_source(COARSE)], make_features(), {"made of": MADE_OF})
+    save_source(path, [make_source(), make_source(COARSE)], make_maps(), {"made of": MADE_OF})
     return path
 
 
@@ -67,7 +82,7 @@ def kept(tmp_path: Path) -> Path:
 def test_nothing_is_lost(tmp_path: Path, size: int, alpha: bool) -> None:
     path = tmp_path / "me.mtsource"
     sources = [make_source(size=each, alpha=alpha) for each in (SIZE, COARSE)]
-    save_source(path, sources, make_features(), {})
+    save_source(path, sources, make_maps(), {})
     wanted, found = make_source(size, alpha=alpha), load_source(path, size)
     pairs = [
         (wanted.photo.rgb, found.photo.rgb),
@@ -84,25 +99,44 @@ def test_nothing_is_lost(tmp_path: Path, size: int, alpha: bool) -> None:
 
 
 def test_features_are_those_of_the_very_weights(kept: Path) -> None:
-    np.testing.assert_array_equal(load_features(kept, DIGEST, MAP), make_features()[DIGEST])
-    assert load_features(kept, "cd" * 32, MAP) is None
-    with pytest.raises(InputError, match=r"features/ab.* is F32 \[5, 64, 64\], where F32 6 x 64"):
-        load_features(kept, DIGEST, (1, 6, SIZE, SIZE))
+    assert_equal(load_features(kept, DIGEST, CONFIG), make_maps()[DIGEST])
+    assert load_features(kept, "cd" * 32, CONFIG) is None
+    with pytest.raises(InputError, match=r"map/ab.* is F32 \[5, 16, 16\], where F32 6 x 16"):
+        load_features(kept, DIGEST, replace(CONFIG, feature_channels=6))
+
+
+def test_a_map_without_detail_is_kept_so(tmp_path: Path) -> None:
+    path, plain = tmp_path / "me.mtsource", replace(CONFIG, colour_shortcut=False)
+    save_source(path, [make_source()], make_maps(plain), {})
+    assert_equal(load_features(path, DIGEST, plain), make_maps(plain)[DIGEST])
+    with pytest.raises(InputError, match=r"is damaged: detail/ab.* is missing"):
+        load_features(path, DIGEST, CONFIG)
+
+
+def test_maps_of_earlier_programs_are_computed_again(tmp_path: Path) -> None:
+    """They had another size."""
+    path = tmp_path / "me.mtsource"
+    save_source(path, [make_source()], {}, {})
+    with safe_open(path, "np") as file:
+        notes = file.metadata()
+    tensors = {**load_file(path), f"features/{DIGEST}": np.zeros((5, SIZE, SIZE), np.float32)}
+    save_file(tensors, path, metadata=notes)
+    assert load_features(path, DIGEST, CONFIG) is None
 
 
 def test_a_kept_feature_map_is_not_computed_again(tmp_path: Path, checkpoint: Path) -> None:
     """But where garments, or parts taken away, have changed the source."""
     recipe = RENDERERS["nhrr"].recipe(checkpoint)
     source = make_source()
-    marked = np.full(recipe.appearance_of(source).shape, 7, np.float32)
+    marked = FeatureMap(np.full_like(recipe.appearance_of(source).features, 7))
     path = tmp_path / "me.mtsource"
     save_source(path, [source], {recipe.content: marked}, {})
     kept = load_source(path, SIZE)
-    np.testing.assert_array_equal(recipe.appearance_of(kept), marked)
+    assert_equal(recipe.appearance_of(kept), marked)
     bare = undress(kept, [2])
     again = recipe.appearance_of(bare)
-    assert (again != 7).any()
-    np.testing.assert_array_equal(again, recipe.appearance_of(undress(source, [2])))
+    assert (again.features != 7).any()
+    assert_equal(again, recipe.appearance_of(undress(source, [2])))
     torso = load_uv_tables().part[2::4, 2::4] == 2  # the middles of texels of SIZE
     assert kept.visibility[0][torso].any()
     assert not bare.visibility[0][torso].any()
@@ -111,7 +145,7 @@ def test_a_kept_feature_map_is_not_computed_again(tmp_path: Path, checkpoint: Pa
 
 def test_the_same_source_gives_the_same_bytes(kept: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.mtsource"
-    save_source(again, [make_source(), make_source(COARSE)], make_features(), {"made of": MADE_OF})
+    save_source(again, [make_source(), make_source(COARSE)], make_maps(), {"made of": MADE_OF})
     assert again.read_bytes() == kept.read_bytes()
     assert kept.stat().st_mode & 0o777 == 0o644
 
@@ -254,7 +288,7 @@ def test_no_damage_does_more_than_raise(kept: Path, data: st.DataObject) -> None
     path.write_bytes(changed)
     try:
         load_source(path, SIZE)
-        load_features(path, DIGEST, MAP)
+        load_features(path, DIGEST, CONFIG)
         inspect_source(path)
     except InputError as error:
         assert len(str(error).splitlines()) == 1

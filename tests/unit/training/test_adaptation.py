@@ -75,7 +75,8 @@ def learn(model: NeuralReRenderer, pictures, poses=(), heard=None, **changes) ->
 def drift(model: NeuralReRenderer, lesson) -> float:
     """How far a drawing is from what a lesson asks for, on the body."""
     with torch.no_grad():
-        drawn = lay_over_white(model.render(lesson["feature_map"], lesson["target_iuv"]))
+        known = lesson["feature_map"], lesson["target_iuv"], lesson.get("detail")
+        drawn = lay_over_white(model.render(*known))
     away = (drawn - lesson["target_image"]).abs()
     return float(away[(lesson["target_iuv"][:, :1] > 0).expand_as(away)].mean())
 
