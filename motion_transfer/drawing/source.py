@@ -31,12 +31,16 @@ from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.media.nearest import take_nearest
 from motion_transfer.media.pictures.photo import Photo
 from nhrr_core import ALL_PARTS, PART_NAMES, load_uv_tables
+from nhrr_core.uv_tables import SAMPLES_PER_TEXEL
 
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
 CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
 SOLID_ALPHA = 192  # of 255; less is mixed with the background
+DENSE_TEXELS = (
+    512  # a side; of finer textures the few texels that are missed are as coarse as those
+)
 LEAST_RATING = 0.01  # of a view, in the units of `View.rating`
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
 
@@ -253,7 +257,12 @@ def unfold_picture(
     rgb, own = np.ascontiguousarray(photo.rgb[body]), np.ascontiguousarray(iuv[body])
     trimmed = trim_outline(rgb, own) if alpha is None else trim_to_alpha(own, alpha[body])
     colours = rgb / np.float32(127.5) - 1
-    return extract_texture(colours, keep_parts(trimmed, picture.parts), texture_size)
+    return extract_texture(
+        colours,
+        keep_parts(trimmed, picture.parts),
+        texture_size,
+        samples_per_texel=SAMPLES_PER_TEXEL if texture_size <= DENSE_TEXELS else 1,
+    )
 
 
 def trim_to_alpha(

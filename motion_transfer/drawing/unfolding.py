@@ -86,19 +86,25 @@ def keep_parts(
 
 
 def extract_texture(
-    image: Float32[np.ndarray, "H W C"], iuv: UInt8[np.ndarray, "H W 3"], size: int
+    image: Float32[np.ndarray, "H W C"],
+    iuv: UInt8[np.ndarray, "H W 3"],
+    size: int,
+    *,
+    samples_per_texel: float = SAMPLES_PER_TEXEL,
 ) -> tuple[Float32[np.ndarray, "C T T"], Float32[np.ndarray, "1 T T"]]:
     """Unfold the visible pixels of a photo, see `nhrr_core.extract_texture`.
 
     Args:
         size: T, side of the texture in texels.
+        samples_per_texel: How close points lie at least that fill a texture between pixels, along a
+            side; with fewer than the default some texels are missed.
     Returns: The texture, 0 where unseen; and the visibility, 1 where seen and 0 elsewhere.
     """
     place, seen = texture_coordinates(iuv), iuv[..., 0] > 0
     total, count = np.zeros((image.shape[-1], size**2)), np.zeros(size**2, np.int64)
     _add(total, count, texel_index(place[:, seen], size), image[seen].T)
     unhit = count == 0  # what is interpolated only fills where no pixel landed
-    for steps, row, column in _quads_by_steps(iuv, place, size):
+    for steps, row, column in _quads_by_steps(iuv, place, size, samples_per_texel):
         found = list(_fill_points(image, iuv, row, column, steps, unhit, size))
         texels, colours = (np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True))
         _add(total, count, texels, colours)
@@ -129,7 +135,10 @@ def _spans(values: Shaped[np.ndarray, "*C H W"]) -> Shaped[np.ndarray, "*C h w"]
 
 
 def _quads_by_steps(
-    iuv: UInt8[np.ndarray, "H W 3"], place: Float32[np.ndarray, "2 H W"], size: int
+    iuv: UInt8[np.ndarray, "H W 3"],
+    place: Float32[np.ndarray, "2 H W"],
+    size: int,
+    samples_per_texel: float,
 ) -> Iterator[tuple[int, Int64[np.ndarray, " Q"], Int64[np.ndarray, " Q"]]]:
     """Quads to fill, as row and column of their first corner, by points along a side."""
     part = iuv[..., 0]
@@ -138,9 +147,9 @@ def _quads_by_steps(
         joined &= _spans(iuv[..., channel]) <= MAX_CHART_STEP * 255
     stretch = _spans(place).max(0)
     joined &= stretch <= MAX_STRETCH
-    wanted = stretch * size * SAMPLES_PER_TEXEL
-    low, steps = SAMPLES_PER_TEXEL, 4  # under one texel apart: none lies between
-    while low < MAX_STRETCH * size * SAMPLES_PER_TEXEL:
+    wanted = stretch * size * samples_per_texel
+    low, steps = samples_per_texel, 4  # under one texel apart: none lies between
+    while low < MAX_STRETCH * size * samples_per_texel:
         row, column = (joined & (wanted > low) & (wanted <= steps)).nonzero()
         if len(row):
             yield steps, row, column
