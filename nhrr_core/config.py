@@ -109,8 +109,8 @@ class ModelConfig:
         Grigorev et al., "Coordinate-based texture inpainting" (CVPR 2019); `dpt` from Neverova et
         al., "Dense pose transfer" (ECCV 2018); widths from Pix2PixHD's global generator (RenderNet)
         and U-Net (FeatureNet). Departs from it: the last ten. `visibility_input` is on; those
-        after it are off, and on in `lite`, so that networks learn in hours what to change instead
-        of learning in days to copy.
+        after it are off, and but for `bilinear` on in `lite`, so that networks learn in hours what
+        to change instead of learning in days to copy.
     """
 
     variant: Variant = "full"
@@ -310,6 +310,5 @@ PRESETS = {
         geometry=True,
         prior=True,
         even=True,
-        bilinear=True,
     ),
 }

@@ -47,7 +47,6 @@ def test_presets() -> None:
         geometry=True,
         prior=True,
         even=True,
-        bilinear=True,
     )
 
 
