@@ -38,10 +38,8 @@ CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up t
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
 SOLID_ALPHA = 192  # of 255; less is mixed with the background
-DENSE_TEXELS = (
-    512  # a side; of finer textures the few texels that are missed are as coarse as those
-)
 LEAST_RATING = 0.01  # of a view, in the units of `View.rating`
+DENSE_TEXELS = 512  # a side; finer textures may miss texels, which are then as coarse as the map
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
 
 

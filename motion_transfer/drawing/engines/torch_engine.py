@@ -87,12 +87,11 @@ class TorchEngine:
             self._lanes_of(side)
 
     def take(self, feature_map: FeatureMap) -> Known:
-        given = (feature_map.features, feature_map.detail)
-        features, detail = (
-            None if each is None else torch.from_numpy(each).to(self._device) for each in given
+        features, detail = torch.from_numpy(feature_map.features), feature_map.detail
+        return Known(
+            features.to(self._device),
+            None if detail is None else torch.from_numpy(detail).to(self._device),
         )
-        assert features is not None
-        return Known(features, detail)
 
     def draw(
         self, feature_map: Known, iuv: UInt8[np.ndarray, "B S S 3"]
