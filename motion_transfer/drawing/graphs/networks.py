@@ -7,7 +7,7 @@ Biases before an instance norm are left out, as the norm takes them away again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ Kernel = Float32[np.ndarray, "A B H W"]
 
 Weights = Mapping[str, Float32[np.ndarray, "..."]]
 """A model's tensors, by the names of `NeuralReRenderer.state_dict()`."""
+
+Projection = Callable[[Float32[np.ndarray, "I O 3 3"]], Float32[np.ndarray, "I O 3 3"]]
 
 Ranges = Mapping[str, tuple[float, float]]
 """The least and the largest value that convolutions read, by the names of their weights."""
@@ -53,13 +55,10 @@ class Convolutions:
         y = self._append("Conv", x, name, weight, bias, {"pads": [1, 1, 1, 1]})
         return self._graph("Relu", y)
 
-    def doubling(self, x: str, name: str, *, even: bool, bilinear: bool) -> str:
-        """A 3x3 transposed convolution of stride 2."""
+    def doubling(self, x: str, name: str, project: Projection | None) -> str:
+        """A 3x3 transposed convolution of stride 2, see `nhrr_core.render_net.UpConvolution`."""
         weight = self._weights[f"{name}.weight"]
-        if bilinear:
-            weight = bilinear_kernel(weight)
-        elif even:
-            weight = even_kernel(weight)
+        weight = project(weight) if project else weight
         places = {"strides": [2, 2], "pads": [1, 1, 1, 1], "output_padding": [1, 1]}
         return self._append("ConvTranspose", x, name, weight, None, places)
 
@@ -177,8 +176,10 @@ def append_render_net(
         x = graph("Add", x, norm(y, width))
     for i in reversed(range(config.down_blocks)):
         width //= 2
-        bilinear = config.bilinear and i == 0
-        x = convolutions.doubling(x, next(names), even=config.even, bilinear=bilinear)
+        project = even_kernel if config.even else None
+        if config.bilinear and i == 0:
+            project = bilinear_kernel
+        x = convolutions.doubling(x, next(names), project)
         x = graph("Relu", norm(x, width))
     if config.geometry:  # the shortcut: what is as fine as a finger is lost in the layers before
         x = graph.join(x, features)
