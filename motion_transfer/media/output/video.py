@@ -34,6 +34,7 @@ from motion_transfer.media.output.pixels import BT709, make_converter
 from motion_transfer.media.output.segments import Segments, WriteFrame
 
 LONGEST_GROUP = 10_000  # frames; longer than any chunk, so that a segment is one group of pictures
+DECODED_AHEAD = 16  # frames; H.264 and H.265 decode a frame at most so long before it is shown
 BIT_EXACT = {"fflags": "+bitexact"}  # or Matroska's are marked with random numbers
 XMP_BOX = bytes.fromhex("be7acfcb97a942e89c71999491e3afac")  # the UUID of a box of XMP
 os.environ.setdefault("SVT_LOG", "0")  # the AV1 encoder greets on stderr otherwise
@@ -78,16 +79,22 @@ def open_segment(
                 f"{codec.encoder} cannot encode {size[0]} x {size[1]} at {rate} frames/s"
                 f" ({error.strerror}); choose another --codec or --fps"
             ) from error
-        numbers = count()
+        numbers, decoded = count(), count(-DECODED_AHEAD)
         convert = make_converter(output_format, mixes=mixes)
+
+        def encode(picture: av.VideoFrame | None) -> None:
+            for packet in stream.encode(picture):
+                # x265's own are uninitialised memory where there are fewer frames than it delays
+                packet.dts = next(decoded)
+                container.mux(packet)
 
         def write(frame: UInt8[np.ndarray, "H W C"]) -> None:
             picture = convert(frame)
             picture.pts, picture.time_base = next(numbers), context.time_base
-            container.mux(stream.encode(picture))
+            encode(picture)
 
         yield write
-        container.mux(stream.encode(None))
+        encode(None)
 
 
 def join_segments(
