@@ -12,7 +12,7 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
-from nhrr_core.config import CLEARANCE_SIZE, UNIT_TEXELS
+from nhrr_core.config import CLEARANCE_SIZE, DETAIL_FULL, DETAIL_NONE, UNIT_TEXELS
 from nhrr_core.texture import extract_texture
 from nhrr_core.uv_layout import texture_coordinates
 
@@ -53,6 +53,18 @@ def pixels_per_texel(
     hit = torch.zeros(iuv.shape[0], texels + 1, device=iuv.device).scatter_(1, texel, 1.0)
     pixels, seen = body.flatten(1).sum(1), hit[:, :texels].sum(1)
     return torch.where(pixels > 0, pixels / seen.clamp_min(1), 1.0).sqrt()
+
+
+def detail_share(scale: Float[Tensor, " B"], size: int) -> Float[Tensor, " B"]:
+    """Tell how much of a source's detail bodies are drawn with: the smaller, the less.
+
+    Args:
+        scale: What `pixels_per_texel` measured.
+        size: Side of the detail, texels.
+    Returns: From 0 to 1, without a jump, or a body that walks away would show it.
+    """
+    apart = size / CLEARANCE_SIZE / scale
+    return ((DETAIL_NONE - apart) / (DETAIL_NONE - DETAIL_FULL)).clamp(0, 1)
 
 
 def spread_clearance(

@@ -41,6 +41,12 @@ OUTLINE_PIXELS = 24
 DETAIL_FACTOR = 4
 """How many times as fine as FeatureNet's texture the one is whose colours are carried past it."""
 
+DETAIL_FULL, DETAIL_NONE = 3.0, 6.0
+"""Texels of detail from pixel to pixel: all of it is drawn up to the first, none beyond the second.
+
+Pixels farther apart would pick single texels out of it, others in each frame.
+"""
+
 FILL_FROM, FILL_TO = 32, 64
 """How many places along a side of the texture colours are spread from, and how many to."""
 

@@ -7,7 +7,7 @@ import torch.nn.functional as F
 from jaxtyping import Float, Shaped, UInt8
 from torch import Tensor, nn
 
-from nhrr_core.clearance import pixels_per_texel, spread_clearance
+from nhrr_core.clearance import detail_share, pixels_per_texel, spread_clearance
 from nhrr_core.config import (
     CLEARANCE_CHANNELS,
     CLEARANCE_SIZE,
@@ -269,14 +269,17 @@ class NeuralReRenderer(nn.Module):
         config = self.config
         looked_up, picture = feature_map.tensor_split([config.sampled_channels], dim=1)
         features = sample_features(looked_up, target_iuv, self.charts)
+        scale = pixels_per_texel(target_iuv, self.charts)
         if detail is not None:
-            features[:, :COLOUR_CHANNELS] += sample_features(detail, target_iuv, self.charts)
+            finer = sample_features(detail, target_iuv, self.charts)
+            share = detail_share(scale, detail.shape[-1])
+            features[:, :COLOUR_CHANNELS] += finer * share[:, None, None, None]
         own, places = features, features[:, :0]
         if config.geometry:
             own, places = features[:, :-POSITION_CHANNELS], features[:, -POSITION_CHANNELS:]
         clearance = own[:, config.appearance_channels :][:, :1]
         if config.clearance:
-            unit = pixels_per_texel(target_iuv, self.charts) * (UNIT_TEXELS / UNIT_PIXELS)
+            unit = scale * (UNIT_TEXELS / UNIT_PIXELS)
             clearance *= unit[:, None, None, None]  # in place, so that `own` has it as well
         image = [own]
         if config.told_iuv:

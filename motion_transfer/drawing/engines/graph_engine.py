@@ -16,7 +16,7 @@ from jaxtyping import Float, UInt8
 from motion_transfer.drawing.engines import Execution
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.lookup import FeatureRows
-from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
+from motion_transfer.drawing.engines.outline import signed_distance
 from motion_transfer.drawing.graphs.whole import (
     CLEARANCE,
     DETAIL,
@@ -33,13 +33,14 @@ from motion_transfer.drawing.graphs.whole import (
     build_sampler,
 )
 from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.unfolding import pixels_per_texel
 from motion_transfer.weights.checkpoint import (
     inspect_checkpoint,
     load_checkpoint,
     read_checkpoint,
     read_ranges,
 )
-from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE
+from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE, UNIT_PIXELS, UNIT_TEXELS
 
 
 class Session(Protocol):
@@ -147,11 +148,12 @@ class GraphEngine(ABC):
     def _inputs(
         self, feature_map: FeatureRows, iuv: UInt8[np.ndarray, "S S 3"]
     ) -> dict[str, np.ndarray]:
-        inputs = {IUV: np.ascontiguousarray(iuv[None]), SAMPLED: feature_map.look_up(iuv)}
+        scale = pixels_per_texel(iuv)
+        inputs = {IUV: np.ascontiguousarray(iuv[None]), SAMPLED: feature_map.look_up(iuv, scale)}
         if self.config.geometry:
             inputs[DISTANCE] = signed_distance(iuv)[None, None]
         if self.config.clearance:
-            inputs[UNIT] = np.full((1, 1, 1, 1), clearance_unit(iuv), np.float32)
+            inputs[UNIT] = np.full((1, 1, 1, 1), scale * UNIT_TEXELS / UNIT_PIXELS, np.float32)
         return inputs
 
     def _painter(self, side: int) -> Session:

@@ -13,7 +13,7 @@ from jaxtyping import Float32, Int32, UInt8
 
 from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.unfolding import chart_entries
-from nhrr_core.config import COLOUR_CHANNELS
+from nhrr_core.config import CLEARANCE_SIZE, COLOUR_CHANNELS, DETAIL_FULL, DETAIL_NONE
 from nhrr_core.uv_tables import load_uv_tables
 
 
@@ -29,31 +29,47 @@ class FeatureRows:
         self._features = _Rows(feature_map.features)
         self._detail = None if feature_map.detail is None else _Rows(feature_map.detail)
 
-    def look_up(self, iuv: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "1 H W D"]:
-        """Look each pixel up, bilinearly; 0 outside the body, see `nhrr_core.sample_features`."""
+    def look_up(
+        self, iuv: UInt8[np.ndarray, "H W 3"], scale: float
+    ) -> Float32[np.ndarray, "1 H W D"]:
+        """Look each pixel up, bilinearly; 0 outside the body, see `nhrr_core.sample_features`.
+
+        Args:
+            scale: What `pixels_per_texel` measured of the body.
+        """
         body = np.flatnonzero(iuv[..., 0])
         entries = chart_entries(iuv.reshape(-1, 3)[body])
         features = self._features.at(entries)
-        if self._detail is not None:
-            features[:, :COLOUR_CHANNELS] += self._detail.at(entries)
+        if self._detail is not None and (share := detail_share(scale, self._detail.size)):
+            features[:, :COLOUR_CHANNELS] += share * self._detail.at(entries)
         looked_up = np.zeros((iuv.shape[0] * iuv.shape[1], features.shape[1]), np.float32)
         looked_up[body] = features
         return looked_up.reshape(1, *iuv.shape[:2], -1)
 
 
+def detail_share(scale: float, size: int) -> float:
+    """Tell how much of a source's detail a body is drawn with, see `nhrr_core.clearance`."""
+    apart = size / CLEARANCE_SIZE / scale
+    return min(max((DETAIL_NONE - apart) / (DETAIL_NONE - DETAIL_FULL), 0.0), 1.0)
+
+
 class _Rows:
-    """A map of which the channels of a texel lie together."""
+    """A map of which the channels of a texel lie together.
+
+    Attributes:
+        size: Its side, texels.
+    """
 
     def __init__(self, values: Float32[np.ndarray, "1 C T T"]) -> None:
-        self._size = values.shape[-1]
+        self.size = values.shape[-1]
         self._rows = np.ascontiguousarray(values.reshape(values.shape[1], -1).T)
 
     def at(self, entries: Int32[np.ndarray, " N"]) -> Float32[np.ndarray, "N C"]:
         """Look up, bilinearly, where rows of the flat table of charts say."""
-        first, shares = _corners(self._size)
+        first, shares = _corners(self.size)
         corner, right, down = first[entries], *(share[entries, None] for share in shares)
         above = self._between(corner, right)
-        below = self._between(corner + self._size, right)
+        below = self._between(corner + self.size, right)
         below -= above
         below *= down
         below += above

@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from motion_transfer.drawing.person import occupancy
-from motion_transfer.drawing.unfolding import pixels_per_texel
-from nhrr_core.config import OUTLINE_PIXELS, UNIT_PIXELS, UNIT_TEXELS
+from nhrr_core.config import OUTLINE_PIXELS
 
 
 def signed_distance(iuv: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W"]:
@@ -22,8 +21,3 @@ def signed_distance(iuv: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "H W
     beyond = cv2.distanceTransform(1 - body, *exact)
     distance = np.where(body, 0.5 - within, beyond - 0.5)
     return distance.clip(-OUTLINE_PIXELS, OUTLINE_PIXELS)
-
-
-def clearance_unit(iuv: UInt8[np.ndarray, "H W 3"]) -> float:
-    """Tell what a clearance of 1 in a feature map is here, in UNIT_PIXELS."""
-    return pixels_per_texel(iuv) * UNIT_TEXELS / UNIT_PIXELS

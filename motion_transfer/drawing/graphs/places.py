@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -13,7 +12,8 @@ from motion_transfer.drawing.graphs.networks import enlarge
 from motion_transfer.drawing.textures import pick_nearest, twins
 from nhrr_core.config import (
     CLEARANCE_SIZE,
-    COLOUR_CHANNELS,
+    DETAIL_FULL,
+    DETAIL_NONE,
     FILL_FROM,
     FILL_METRES,
     FILL_TO,
@@ -111,33 +111,23 @@ def texel_positions(size: int) -> Float32[np.ndarray, "1 3 T T"]:
     return np.ascontiguousarray(places[None])
 
 
-def look_up(
-    graph: Graph, feature_map: str, iuv: str, channels: int, detail: str | None = None
-) -> tuple[str, str]:
-    """Look each pixel up in a feature map, see `nhrr_core.sample_features`.
+def look_up(graph: Graph, values: str, places: str, body: str) -> str:
+    """Look each pixel up in a map, 1 x D x T x T, see `nhrr_core.sample_features`.
 
-    Args:
-        feature_map: 1 x D x T x T.
-        iuv: 1 x H x W x 3 uint8.
-        channels: D.
-        detail: What is added to the first three channels, 1 x 3 x t x t.
-    Returns: The features, 1 x D x H x W, 0 outside the body; and the body, 1 x 1 x H x W, 1 or 0.
+    Returns: 1 x D x H x W, 0 outside the body.
     """
-    grid = graph("Sub", graph("Mul", _find_places(graph, iuv), 2), 1)
-    places: dict[str, Any] = {"mode": "bilinear", "padding_mode": "border"}
-    sampled = graph("GridSample", feature_map, grid, **places)
-    if detail is not None:
-        finer = graph("GridSample", detail, grid, **places)
-        colours = graph("Add", graph.part(sampled, 0, COLOUR_CHANNELS), finer)
-        others = [graph.part(sampled, COLOUR_CHANNELS, channels)] * (channels > COLOUR_CHANNELS)
-        sampled = graph.join(colours, *others)
+    grid = graph("Sub", graph("Mul", places, 2), 1)
+    sampled = graph("GridSample", values, grid, mode="bilinear", padding_mode="border")
+    return graph("Mul", sampled, body)
+
+
+def find_body(graph: Graph, iuv: str) -> str:
+    """Tell where anybody is in 1 x H x W x 3 uint8: 1 x 1 x H x W, 1 or 0."""
     part = graph("Gather", iuv, np.array(0), axis=3)
-    body = graph("Cast", graph("Unsqueeze", part, np.array([1])), to=FLOAT)
-    body = graph("Min", body, 1)
-    return graph("Mul", sampled, body), body
+    return graph("Min", graph("Cast", graph("Unsqueeze", part, np.array([1])), to=FLOAT), 1)
 
 
-def _find_places(graph: Graph, iuv: str) -> str:
+def find_places(graph: Graph, iuv: str) -> str:
     """Where each pixel lies in the texture, (x, y), 1 x H x W x 2; the background is part 1's."""
     # the table is of 16-bit words, which graphics processors do not know: as bytes, low and high
     words = (load_uv_tables().charts * WORD).round().astype(np.uint16).reshape(-1, 2)
@@ -218,9 +208,9 @@ def _nearest_along(graph: Graph, squared: str, axis: int, reach: int) -> str:
     return graph("ReduceMin", sums, axes=[axis], keepdims=0)
 
 
-def pixels_per_texel(graph: Graph, iuv: str, body: str) -> str:
+def pixels_per_texel(graph: Graph, places: str, body: str) -> str:
     """Measure how large the body is in its image, 1 x 1 x 1 x 1, see `nhrr_core.clearance`."""
-    texels = graph("Mul", _find_places(graph, iuv), float(CLEARANCE_SIZE))
+    texels = graph("Mul", places, float(CLEARANCE_SIZE))
     texels = graph("Cast", graph("Clip", texels, 0, float(CLEARANCE_SIZE - 1)), to=INT64)
     row = graph("Mul", texels, np.array([1, CLEARANCE_SIZE]))
     index = graph("Reshape", graph("ReduceSum", row, np.array([3]), keepdims=0), np.array([-1]))
@@ -234,3 +224,10 @@ def pixels_per_texel(graph: Graph, iuv: str, body: str) -> str:
     ratio = graph("Div", pixels, graph("Max", texels, 1))
     scale = graph("Where", graph("Greater", pixels, 0), graph("Sqrt", ratio), 1)
     return graph("Reshape", scale, np.array([1, 1, 1, 1]))
+
+
+def detail_share(graph: Graph, scale: str, size: int) -> str:
+    """Tell how much of a source's detail is drawn, 1 x 1 x 1 x 1, see `nhrr_core.clearance`."""
+    apart = graph("Div", size / CLEARANCE_SIZE, scale)
+    share = graph("Mul", graph("Sub", DETAIL_NONE, apart), 1 / (DETAIL_NONE - DETAIL_FULL))
+    return graph("Clip", share, 0.0, 1.0)

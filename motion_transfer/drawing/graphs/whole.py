@@ -17,7 +17,10 @@ from motion_transfer.drawing.graphs.networks import (
     enlarge,
 )
 from motion_transfer.drawing.graphs.places import (
+    detail_share,
     fill_holes,
+    find_body,
+    find_places,
     look_up,
     pixels_per_texel,
     resize_nearest,
@@ -100,11 +103,15 @@ def _complete(
     if config.has_detail:
         finer = graph("Sub", texture, enlarge(graph, own[0], factor))
         detail = graph("Mul", finer, visibility)
-    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), own[0])
-    if config.feature_outputs == COLOUR_CHANNELS:
-        return colours, detail
-    others = graph.part(features, COLOUR_CHANNELS, config.feature_outputs)
-    return graph.join(colours, others), detail
+    return _add_to_colours(graph, features, own[0], config.feature_outputs), detail
+
+
+def _add_to_colours(graph: Graph, features: str, change: str, channels: int) -> str:
+    """Add to the first three of some channels."""
+    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), change)
+    if channels == COLOUR_CHANNELS:
+        return colours
+    return graph.join(colours, graph.part(features, COLOUR_CHANNELS, channels))
 
 
 def _read_by_feature_net(
@@ -219,17 +226,22 @@ def _append_sampler(
         body = graph("Cast", inside, to=FLOAT)
         distance, unit = DISTANCE, UNIT
     else:
-        detail = DETAIL if config.has_detail else None
-        sampled, body = look_up(graph, FEATURE_MAP, iuv, config.map_channels, detail)
+        body, places = find_body(graph, iuv), find_places(graph, iuv)
+        sampled = look_up(graph, FEATURE_MAP, places, body)
+        scale = ""
+        if config.clearance or config.has_detail:
+            scale = pixels_per_texel(graph, places, body)
+        if config.has_detail:
+            finer = look_up(graph, DETAIL, places, body)
+            share = detail_share(graph, scale, config.finest_texture)
+            change = graph("Mul", finer, share)
+            sampled = _add_to_colours(graph, sampled, change, config.map_channels)
+        unit = graph("Mul", scale, UNIT_TEXELS / UNIT_PIXELS) if config.clearance else ""
         distance = signed_distance(graph, body, OUTLINE_PIXELS) if config.geometry else ""
-        unit = ""
     learned, end = config.appearance_channels, config.map_channels
     image = [graph.part(sampled, 0, learned)]
     nearest = []
     if config.clearance:
-        if not looked_up:
-            scale = pixels_per_texel(graph, iuv, body)
-            unit = graph("Mul", scale, UNIT_TEXELS / UNIT_PIXELS)
         clearance = graph("Mul", graph.part(sampled, learned, learned + 1), unit)
         image += [clearance, graph.part(sampled, learned + 1, learned + 2)]
         nearest.append(clearance)

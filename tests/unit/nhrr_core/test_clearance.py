@@ -7,7 +7,13 @@ import torch
 from torch import Tensor
 
 from nhrr_core import unfold_clearance
-from nhrr_core.clearance import CLEARANCE_SIZE, UNIT_TEXELS, pixels_per_texel, spread_clearance
+from nhrr_core.clearance import (
+    CLEARANCE_SIZE,
+    UNIT_TEXELS,
+    detail_share,
+    pixels_per_texel,
+    spread_clearance,
+)
 
 
 @pytest.mark.parametrize("side", [40, 80, 160])
@@ -59,3 +65,10 @@ def test_the_map_says_whether_anything_was_measured() -> None:
     assert torch.equal(spread[:, :1, ::4, ::4], filled)
     assert spread[0, 1].unique().tolist() == [1]
     assert spread[1, 1].unique().tolist() == [0]
+
+
+def test_the_smaller_a_body_the_less_of_its_detail_is_drawn() -> None:
+    """Texels of 1024 from pixel to pixel: 2, 3, 4.5, 6 and 8."""
+    scales = 8 / torch.tensor([2, 3, 4.5, 6, 8])
+    assert torch.allclose(detail_share(scales, 1024), torch.tensor([1, 1, 0.5, 0, 0]))
+    assert torch.equal(detail_share(scales, 256), torch.ones(5)), "of a coarser one, all"

@@ -204,7 +204,7 @@ def test_calls_side_by_side_draw_the_same(
         np.testing.assert_array_equal(call.result(), alone[number % 3])
 
 
-@pytest.mark.parametrize("finest", [None, 64])
+@pytest.mark.parametrize("finest", [None, 64, 600, 1024], ids=["without", "all", "some", "none"])
 @pytest.mark.parametrize("size", [16, 100, 512])
 def test_the_look_up_is_torchs(size: int, finest: int | None) -> None:
     """Of all parts, and of places at the texture's edges."""
@@ -214,17 +214,19 @@ def test_the_look_up_is_torchs(size: int, finest: int | None) -> None:
     iuv[:4, :, 1:] = rng.choice(np.array([0, 255], np.uint8), (4, 56, 2))
     features = rng.normal(size=(1, 7, size, size)).astype(np.float32)
     detail = finest and rng.normal(size=(1, 3, finest, finest)).astype(np.float32)
-    looked_up = FeatureRows(FeatureMap(features, detail)).look_up(iuv)
+    looked_up = FeatureRows(FeatureMap(features, detail)).look_up(iuv, pixels_per_texel(iuv))
     target, charts = torch.from_numpy(iuv).permute(2, 0, 1)[None], load_uv_layout().charts
     expected = sampling.sample_features(torch.from_numpy(features), target, charts)
     if detail is not None:
-        expected[:, :3] += sampling.sample_features(torch.from_numpy(detail), target, charts)
+        share = clearance.detail_share(clearance.pixels_per_texel(target, charts), finest)
+        finer = sampling.sample_features(torch.from_numpy(detail), target, charts)
+        expected[:, :3] += share * finer
     np.testing.assert_allclose(looked_up, expected.permute(0, 2, 3, 1).numpy(), rtol=0, atol=2e-4)
 
 
 def test_nobody_is_looked_up() -> None:
     ones = np.ones((1, 3, 16, 16), np.float32)
-    assert not FeatureRows(FeatureMap(ones, ones)).look_up(np.zeros((8, 8, 3), np.uint8)).any()
+    assert not FeatureRows(FeatureMap(ones, ones)).look_up(np.zeros((8, 8, 3), np.uint8), 1).any()
 
 
 def test_the_outline_is_torchs(crops: np.ndarray) -> None:

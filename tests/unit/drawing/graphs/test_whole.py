@@ -11,9 +11,11 @@ import torch
 
 from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.engines.lookup import FeatureRows
-from motion_transfer.drawing.engines.outline import clearance_unit, signed_distance
+from motion_transfer.drawing.engines.outline import signed_distance
 from motion_transfer.drawing.graphs.whole import build_encoder, build_painter, build_sampler
+from motion_transfer.drawing.unfolding import pixels_per_texel
 from nhrr_core import ModelConfig, NeuralReRenderer
+from nhrr_core.config import UNIT_PIXELS, UNIT_TEXELS
 
 SMALL = {
     "feature_width": 2,
@@ -45,6 +47,7 @@ CONFIGURATIONS: list[dict[str, Any]] = [
     {**EVERYTHING, "prior": True, "bilinear": True},
     {**EVERYTHING, "variant": "warp-cond"},
     {**EVERYTHING, "image_size": 40, "texture_size": 48},
+    {**EVERYTHING, "texture_size": 160},  # so fine that some of its detail is drawn
 ]
 NARROW = (np.arange(48)[:, None] // 8 == 4).astype(np.uint8)
 each = pytest.mark.parametrize("changes", CONFIGURATIONS, ids=lambda c: "-".join(map(str, c)))
@@ -165,12 +168,13 @@ def test_the_painter_may_be_given_what_is_looked_up(changes: dict[str, Any]) -> 
     config = model.config
     known = arrays(noise(config))
     rows = FeatureRows(FeatureMap(known["feature_map"], known.get("detail")))
+    scale = pixels_per_texel(iuv[0])
     inputs = {
         **known,
         "iuv": iuv,
-        "sampled": rows.look_up(iuv[0]),
+        "sampled": rows.look_up(iuv[0], scale),
         "distance": signed_distance(iuv[0])[None, None],
-        "unit": np.full((1, 1, 1, 1), clearance_unit(iuv[0]), np.float32),
+        "unit": np.full((1, 1, 1, 1), scale * UNIT_TEXELS / UNIT_PIXELS, np.float32),
     }
     weights = weights_of(model)
     (given,) = run(build_painter(config, weights, looked_up=True), inputs)
