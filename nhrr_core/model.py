@@ -120,8 +120,10 @@ class NeuralReRenderer(nn.Module):
         """
         if self.config.reads_photo and pictures is None:
             raise ShapeError(f"variant {self.config.variant} reads the source's picture; give it")
-        texture, visibility = shrink_texture(texture, visibility, self._factor(texture))
-        carried = [self._complete(texture, visibility, pictures)]
+        factor = self._factor(texture)
+        share = F.avg_pool2d(visibility, factor)
+        texture, visibility = shrink_texture(texture, visibility, factor)
+        carried = [self._complete(texture, visibility, share, pictures)]
         if self.config.clearance:
             if clearance is None:
                 clearance = texture.new_zeros(
@@ -167,8 +169,14 @@ class NeuralReRenderer(nn.Module):
         self,
         texture: Float[Tensor, "B 3 T T"],
         visibility: Float[Tensor, "B 1 T T"],
+        share: Float[Tensor, "B 1 T T"],
         pictures: UInt8[Tensor, "B P 6 S S"] | None,
     ) -> Float[Tensor, "B D T T"]:
+        """Complete a partial texture.
+
+        Args:
+            share: How much of each texel is seen; that much of its colour is known, and stays.
+        """
         if self.feature_net is None:
             return texture
         if texture.shape[-1] % 16 or texture.shape[-2] % 16:
@@ -181,7 +189,7 @@ class NeuralReRenderer(nn.Module):
         if not self.config.colour_shortcut:
             return feature_map
         colours, others = feature_map.tensor_split([COLOUR_CHANNELS], dim=1)
-        return torch.cat([colours + own[0][:, :COLOUR_CHANNELS], others], dim=1)
+        return torch.cat([own[0][:, :COLOUR_CHANNELS] + colours * (1 - share), others], dim=1)
 
     def _features_like(
         self,

@@ -14,6 +14,7 @@ import onnx
 from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.engines import Execution
+from motion_transfer.drawing.engines.around import continue_patterns
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.outline import signed_distance
@@ -95,7 +96,8 @@ class GraphEngine(ABC):
         named = {TEXTURE: source.texture, VISIBILITY: source.visibility, CLEARANCE: clearance}
         inputs = {name: np.ascontiguousarray(array[None]) for name, array in named.items()}
         outputs = self._encoder.run_all(inputs)
-        return FeatureMap(outputs[FEATURE_MAP], outputs.get(DETAIL))
+        found = FeatureMap(outputs[FEATURE_MAP], outputs.get(DETAIL))
+        return continue_patterns(found, source)
 
     def prepare(self, sides: Collection[int]) -> None:
         for side in sides:

@@ -88,7 +88,7 @@ def _complete(
     if not config.has_feature_net:
         return texture, None
     factor = config.finest_texture // config.texture_size
-    coarse, seen = texture, visibility
+    coarse, seen, share = texture, visibility, visibility
     if factor > 1:
         pool = {"kernel_shape": [factor, factor], "strides": [factor, factor]}
         share = graph("AveragePool", visibility, **pool)
@@ -103,12 +103,13 @@ def _complete(
     if config.has_detail:
         finer = graph("Sub", texture, enlarge(graph, own[0], factor))
         detail = graph("Mul", finer, visibility)
-    return _add_to_colours(graph, features, own[0], config.feature_outputs), detail
+    change = graph("Mul", graph.part(features, 0, COLOUR_CHANNELS), graph("Sub", 1, share))
+    colours = graph("Add", own[0], change)
+    return _with_colours(graph, colours, features, config.feature_outputs), detail
 
 
-def _add_to_colours(graph: Graph, features: str, change: str, channels: int) -> str:
-    """Add to the first three of some channels."""
-    colours = graph("Add", graph.part(features, 0, COLOUR_CHANNELS), change)
+def _with_colours(graph: Graph, colours: str, features: str, channels: int) -> str:
+    """Put colours in the place of the first three channels."""
     if channels == COLOUR_CHANNELS:
         return colours
     return graph.join(colours, graph.part(features, COLOUR_CHANNELS, channels))
@@ -234,8 +235,9 @@ def _append_sampler(
         if config.has_detail:
             finer = look_up(graph, DETAIL, places, body)
             share = detail_share(graph, scale, config.finest_texture)
-            change = graph("Mul", finer, share)
-            sampled = _add_to_colours(graph, sampled, change, config.map_channels)
+            own = graph.part(sampled, 0, COLOUR_CHANNELS)
+            colours = graph("Add", own, graph("Mul", finer, share))
+            sampled = _with_colours(graph, colours, sampled, config.map_channels)
         unit = graph("Mul", scale, UNIT_TEXELS / UNIT_PIXELS) if config.clearance else ""
         distance = signed_distance(graph, body, OUTLINE_PIXELS) if config.geometry else ""
     learned, end = config.appearance_channels, config.map_channels

@@ -1,0 +1,193 @@
+"""Prints, checks and lace, continued around the body to where no photo shows them.
+
+FeatureNet guesses what colour a hidden side has, but no pattern. Clothes look alike all the way
+around at one height: a row of flowers, a stripe, a border of lace. So what stands out from its
+surroundings is copied to the hidden side from the same height, mirrored at the edge of what is
+seen, over and over: patterns go on, and nothing moves up or down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float32, Int64
+
+from motion_transfer.drawing.engines.interface import FeatureMap
+from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.textures import mirror_texture, pick_nearest, shrink_texture
+from nhrr_core import load_uv_tables
+from nhrr_core.config import COLOUR_CHANNELS
+
+SURROUNDINGS_METRES = 0.03  # of a texel: what a pattern stands out from
+PLAIN, PATTERNED = 0.15, 0.25  # RMS of that, of colours in [-1, 1]: folds and shadows; prints, lace
+ALIKE, APART = 0.15, 0.4  # colours of the ground that a pattern is copied from, and of the guess
+
+CELL_METRES = 0.005  # about a texel of the layout
+DOUBTED_METRES = 0.01  # from the edge of what is seen: there IUV often has another part's pixels
+LEAST_RUN = 4  # cells seen side by side; fewer tell no pattern
+STEEP = 3  # a cell without a texel takes one beside it rather than one above or below
+LEAST_SHARE = 0.15  # of the way around has to be seen
+TORSO, THIGHS = (1, 2), ((7, 9), (8, 10))  # sleeves are too narrow: their edges are all they show
+SHOULDER_METRES = 0.2  # above the layout's origin a torso is no tube any more
+
+
+def continue_patterns(feature_map: FeatureMap, source: Source) -> FeatureMap:
+    """Add the patterns of a source's clothes to what a network guesses of their hidden sides.
+
+    Args:
+        feature_map: The network's; one without detail does not begin with colours, and stays.
+    """
+    if feature_map.detail is None:
+        return feature_map
+    size = feature_map.features.shape[-1]
+    factor = source.texture.shape[-1] // size
+    texture, shown = mirror_texture(*shrink_texture(source.texture, source.visibility, factor))
+    ground, pattern = _take_apart(texture, shown[0] > 0)
+    copied, gained = continue_around(np.concatenate([pattern, ground]), shown[0] > 0)
+    pattern, ground = np.split(copied, 2)
+    features = feature_map.features.copy()
+    colours = features[0, :COLOUR_CHANNELS]  # a view
+    apart = np.abs(ground - colours).mean(0)
+    colours += pattern * _fall(apart, ALIKE, APART) * gained
+    return replace(feature_map, features=features)
+
+
+def _take_apart(
+    texture: Float32[np.ndarray, "3 T T"], shown: Bool[np.ndarray, "T T"]
+) -> tuple[Float32[np.ndarray, "3 T T"], Float32[np.ndarray, "3 T T"]]:
+    """Split clothes into a smooth ground and the pattern on it, which plain ones have none of."""
+    size = len(shown)
+    worn = np.zeros(size**2, bool)
+    for tube in unroll_body(size):
+        worn[tube.texels] = True
+    known = (shown & worn.reshape(shown.shape)).astype(np.float32)
+    reach = SURROUNDINGS_METRES / CELL_METRES * size / len(load_uv_tables().part)
+    ground = _mean_nearby(texture, known, reach)
+    pattern = (texture - ground) * known
+    strength = np.sqrt(_mean_nearby(np.square(pattern).mean(0)[None], known, 2 * reach))
+    return ground, pattern * (1 - _fall(strength, PLAIN, PATTERNED))
+
+
+def _mean_nearby(
+    values: Float32[np.ndarray, "C T T"], known: Float32[np.ndarray, "T T"], reach: float
+) -> Float32[np.ndarray, "C T T"]:
+    """Average what is known around each texel, with weights of a Gaussian, reach in texels."""
+    sums = [cv2.GaussianBlur(plane * known, (0, 0), reach) for plane in values]
+    return np.stack(sums) / np.maximum(cv2.GaussianBlur(known, (0, 0), reach), np.float32(1e-3))
+
+
+def _fall(
+    values: Float32[np.ndarray, "*S"], first: float, last: float
+) -> Float32[np.ndarray, "*S"]:
+    """Fall from 1 to 0 between two values."""
+    return ((last - values) / (last - first)).clip(0, 1)
+
+
+def continue_around(
+    texture: Float32[np.ndarray, "C T T"], shown: Bool[np.ndarray, "T T"]
+) -> tuple[Float32[np.ndarray, "C T T"], Bool[np.ndarray, "T T"]]:
+    """Copy what a partial texture shows of torso and thighs around them.
+
+    Returns: The texture, 0 where nothing was copied to; and where something was.
+    """
+    given, seen = texture.reshape(len(texture), -1), shown.reshape(-1)
+    copied, gained = np.zeros_like(given), np.zeros_like(seen)
+    for tube in unroll_body(len(shown)):
+        image = _mirror_at_edges(_trust(seen[tube.cells]))[tube.rows, tube.columns]
+        here = ~seen[tube.texels] & (image >= 0)
+        texels = tube.texels[here]
+        copied[:, texels] = given[:, tube.cells[tube.rows[here], image[here]]]
+        gained[texels] = True
+    return copied.reshape(texture.shape), gained.reshape(shown.shape)
+
+
+def _trust(seen: Bool[np.ndarray, "H A"]) -> Bool[np.ndarray, "H A"]:
+    """Leave out what is seen at the edge only, or in too small a part of a row."""
+    width = seen.shape[1]
+    reach = round(DOUBTED_METRES / CELL_METRES)
+    around = np.tile(seen, 3).astype(np.uint8)
+    inner = cv2.erode(around, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    runs = cv2.morphologyEx(inner, cv2.MORPH_OPEN, np.ones((1, LEAST_RUN), np.uint8))
+    trusted = runs[:, width : 2 * width] > 0
+    return trusted & (trusted.mean(1, keepdims=True) >= LEAST_SHARE)
+
+
+def _mirror_at_edges(trusted: Bool[np.ndarray, "H A"]) -> Int64[np.ndarray, "H A"]:
+    """Find the column that each cell is the mirror image of, at the nearer edge; -1: none."""
+    width = trusted.shape[1]
+    around = np.tile(trusted, 3)
+    left, from_left = _mirror_to_the_left(around)
+    right, from_right = (each[:, ::-1] for each in _mirror_to_the_left(around[:, ::-1]))
+    found = np.where(left <= right, from_left, around.shape[1] - 1 - from_right) % width
+    found[np.minimum(left, right) > around.shape[1]] = -1
+    return found[:, width : 2 * width]
+
+
+def _mirror_to_the_left(
+    trusted: Bool[np.ndarray, "H W"],
+) -> tuple[Int64[np.ndarray, "H W"], Int64[np.ndarray, "H W"]]:
+    """Mirror each column at the nearest run up to it, to and fro within that run.
+
+    Returns: How far the run's end is, more than W where there is none; and the columns.
+    """
+    column = np.arange(trusted.shape[1])
+    begins = trusted & ~np.pad(trusted, ((0, 0), (1, 0)))[:, :-1]
+    end = np.maximum.accumulate(np.where(trusted, column, -1), axis=1)
+    start = np.maximum.accumulate(np.where(begins, column, -1), axis=1)
+    away, length = column - end, end - start + 1
+    step = np.maximum(away - 1, 0) % (2 * length)
+    step = np.minimum(step, 2 * length - 1 - step)
+    return np.where(end < 0, 2 * len(column), away), end - step
+
+
+@dataclass(frozen=True)
+class Tube:
+    """A torso or thigh, unrolled: each row a way around it.
+
+    Attributes:
+        cells: The texel that is nearest to each cell, H x A; columns go around.
+        texels: Those of the tube.
+        rows, columns: The cells that they lie in.
+    """
+
+    cells: Int64[np.ndarray, "H A"]
+    texels: Int64[np.ndarray, " N"]
+    rows: Int64[np.ndarray, " N"]
+    columns: Int64[np.ndarray, " N"]
+
+
+@lru_cache(maxsize=2)
+def unroll_body(size: int) -> list[Tube]:
+    """Unroll torso and thighs of a texture of that side."""
+    tables = load_uv_tables()
+    part = pick_nearest(tables.part, size).reshape(-1)
+    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1)
+    torso = np.isin(part, TORSO) & (position[1] < SHOULDER_METRES)
+    thighs = [np.isin(part, parts) for parts in THIGHS]
+    return [_unroll(np.flatnonzero(own), position) for own in (torso, *thighs)]
+
+
+def _unroll(texels: Int64[np.ndarray, " N"], position: Float32[np.ndarray, "3 M"]) -> Tube:
+    x, y, z = position[:, texels]
+    rows = ((y - y.min()) / CELL_METRES).astype(np.int64)
+    across = np.stack([x, z])
+    low, high = (np.full((2, rows.max() + 1), sign * np.inf) for sign in (1, -1))
+    np.minimum.at(low.T, rows, across.T)
+    np.maximum.at(high.T, rows, across.T)
+    sides = across - (low[:, rows] + high[:, rows]) / 2
+    width = round(2 * np.pi * float(np.median(np.hypot(*sides))) / CELL_METRES)
+    columns = (np.arctan2(*sides) / (2 * np.pi) % 1 * width).astype(np.int64) % width
+    cells = np.full((len(low.T), width), -1)
+    cells[rows, columns] = texels
+    around = np.tile(np.repeat(cells, STEEP, axis=0), 3)
+    empty = (around < 0).astype(np.uint8)
+    of_a_pixel = cv2.DIST_LABEL_PIXEL
+    _, labels = cv2.distanceTransformWithLabels(empty, cv2.DIST_L2, 5, labelType=of_a_pixel)
+    label = labels.astype(np.int64)
+    named = np.zeros(label.max() + 1, np.int64)
+    named[label[empty == 0]] = around[empty == 0]
+    nearest = named[label][STEEP // 2 :: STEEP, width : 2 * width]
+    return Tube(nearest, texels, rows, columns)
