@@ -23,7 +23,7 @@ from nhrr_core.config import COLOUR_CHANNELS
 
 SURROUNDINGS_METRES = 0.03  # of a texel: what a pattern stands out from
 PLAIN, PATTERNED = 0.15, 0.25  # RMS of that, of colours in [-1, 1]: folds and shadows; prints, lace
-ALIKE, APART = 0.15, 0.4  # colours of the ground that a pattern is copied from, and of the guess
+ALIKE, APART = 0.1, 0.25  # colours of the ground that a pattern is copied from, and of the guess
 
 CELL_METRES = 0.005  # about a texel of the layout
 DOUBTED_METRES = 0.01  # from the edge of what is seen: there IUV often has another part's pixels
