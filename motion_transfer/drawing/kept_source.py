@@ -127,7 +127,9 @@ def load_picture(path: Path) -> SourcePicture:
 
 
 def load_features(path: Path, digest: str, config: ModelConfig) -> FeatureMap | None:
-    """Read the feature map that some weights made; None if only others did, or an older program.
+    """Read the feature map that some weights made; None if only others did, or another program.
+
+    What a program draws from the file equals what it draws from the photos only so.
 
     Args:
         digest: SHA-256 of the weights, hexadecimal.
@@ -136,7 +138,7 @@ def load_features(path: Path, digest: str, config: ModelConfig) -> FeatureMap | 
     """
     side, finest = config.texture_size, config.finest_texture
     with _open(path) as file:
-        if f"map/{digest}" not in file.shapes:
+        if f"map/{digest}" not in file.shapes or file.facts.get("program") != __version__:
             return None
         features = file.read(f"map/{digest}", "F32", (config.map_channels, side, side))[None]
         if not config.has_detail:

@@ -113,15 +113,10 @@ def test_a_map_without_detail_is_kept_so(tmp_path: Path) -> None:
         load_features(path, DIGEST, CONFIG)
 
 
-def test_maps_of_earlier_programs_are_computed_again(tmp_path: Path) -> None:
-    """They had another size."""
-    path = tmp_path / "me.mtsource"
-    save_source(path, [make_source()], {}, {})
-    with safe_open(path, "np") as file:
-        notes = file.metadata()
-    tensors = {**load_file(path), f"features/{DIGEST}": np.zeros((5, SIZE, SIZE), np.float32)}
-    save_file(tensors, path, metadata=notes)
-    assert load_features(path, DIGEST, CONFIG) is None
+def test_maps_of_other_programs_are_computed_again(kept: Path) -> None:
+    """What they drew from the photos may differ."""
+    change(kept, {"program": "0.2.0"})
+    assert load_features(kept, DIGEST, CONFIG) is None
 
 
 def test_a_kept_feature_map_is_not_computed_again(tmp_path: Path, checkpoint: Path) -> None:
