@@ -3,7 +3,7 @@
 FeatureNet guesses what colour a hidden side has, but no pattern. Clothes look alike all the way
 around at one height: a row of flowers, a stripe, a border of lace. So what stands out from its
 surroundings is copied to the hidden side from the same height, mirrored at the edge of what is
-seen, over and over: patterns go on, and nothing moves up or down.
+seen, over and over: patterns go on, and nothing moves up or down, but across narrow gaps.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ CELL_METRES = 0.005  # about a texel of the layout
 DOUBTED_METRES = 0.01  # from the edge of what is seen: there IUV often has another part's pixels
 LEAST_RUN = 4  # cells seen side by side; fewer tell no pattern
 STEEP = 3  # a cell without a texel takes one beside it rather than one above or below
+GAP_METRES = 0.04  # rows may lie so far from seen ones: seams between parts of the body
 LEAST_SHARE = 0.15  # of the way around has to be seen
 TORSO, THIGHS = (1, 2), ((7, 9), (8, 10))  # sleeves are too narrow: their edges are all they show
 SHOULDER_METRES = 0.2  # above the layout's origin a torso is no tube any more
@@ -67,7 +68,7 @@ def _take_apart(
     reach = SURROUNDINGS_METRES / CELL_METRES * size / len(load_uv_tables().part)
     ground = _mean_nearby(texture, known, reach)
     pattern = (texture - ground) * known
-    strength = np.sqrt(_mean_nearby(np.square(pattern).mean(0)[None], known, 2 * reach))
+    strength = np.sqrt(_mean_nearby(np.square(pattern).mean(0)[None], known, reach))
     return ground, pattern * (1 - _fall(strength, PLAIN, PATTERNED))
 
 
@@ -96,10 +97,12 @@ def continue_around(
     given, seen = texture.reshape(len(texture), -1), shown.reshape(-1)
     copied, gained = np.zeros_like(given), np.zeros_like(seen)
     for tube in unroll_body(len(shown)):
-        image = _mirror_at_edges(_trust(seen[tube.cells]))[tube.rows, tube.columns]
-        here = ~seen[tube.texels] & (image >= 0)
+        trusted = _trust(seen[tube.cells])
+        row = _nearest_row(trusted.any(1))[tube.rows]
+        column = _mirror_at_edges(trusted)[row, tube.columns]
+        here = ~seen[tube.texels] & (column >= 0)
         texels = tube.texels[here]
-        copied[:, texels] = given[:, tube.cells[tube.rows[here], image[here]]]
+        copied[:, texels] = given[:, tube.cells[row[here], column[here]]]
         gained[texels] = True
     return copied.reshape(texture.shape), gained.reshape(shown.shape)
 
@@ -113,6 +116,15 @@ def _trust(seen: Bool[np.ndarray, "H A"]) -> Bool[np.ndarray, "H A"]:
     runs = cv2.morphologyEx(inner, cv2.MORPH_OPEN, np.ones((1, LEAST_RUN), np.uint8))
     trusted = runs[:, width : 2 * width] > 0
     return trusted & (trusted.mean(1, keepdims=True) >= LEAST_SHARE)
+
+
+def _nearest_row(trusted: Bool[np.ndarray, " H"]) -> Int64[np.ndarray, " H"]:
+    """Find the row that each one takes its cells from: its own, or a mirrored one across a gap."""
+    row = np.arange(len(trusted))
+    below, from_below = (each[0] for each in _mirror_to_the_left(trusted[None]))
+    above, from_above = (each[0, ::-1] for each in _mirror_to_the_left(trusted[None, ::-1]))
+    found = np.where(below <= above, from_below, len(row) - 1 - from_above)
+    return np.where(np.minimum(below, above) <= GAP_METRES / CELL_METRES, found, row)
 
 
 def _mirror_at_edges(trusted: Bool[np.ndarray, "H A"]) -> Int64[np.ndarray, "H A"]:
