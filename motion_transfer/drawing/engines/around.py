@@ -98,7 +98,7 @@ def continue_around(
     copied, gained = np.zeros_like(given), np.zeros_like(seen)
     for tube in unroll_body(len(shown)):
         trusted = _trust(seen[tube.cells])
-        row = _nearest_row(trusted.any(1))[tube.rows]
+        row = _nearest_row(trusted.sum(1) > 0)[tube.rows]
         column = _mirror_at_edges(trusted)[row, tube.columns]
         here = ~seen[tube.texels] & (column >= 0)
         texels = tube.texels[here]
