@@ -111,12 +111,13 @@ def texel_positions(size: int) -> Float32[np.ndarray, "1 3 T T"]:
     return np.ascontiguousarray(places[None])
 
 
-def look_up(graph: Graph, values: str, places: str, body: str) -> str:
+def look_up(graph: Graph, values: str, grid: str, body: str) -> str:
     """Look each pixel up in a map, 1 x D x T x T, see `nhrr_core.sample_features`.
 
+    Args:
+        grid: Where each pixel lies in it, (x, y), 1 x H x W x 2, in [-1, 1].
     Returns: 1 x D x H x W, 0 outside the body.
     """
-    grid = graph("Sub", graph("Mul", places, 2), 1)
     sampled = graph("GridSample", values, grid, mode="bilinear", padding_mode="border")
     return graph("Mul", sampled, body)
 

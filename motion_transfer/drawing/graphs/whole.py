@@ -228,12 +228,13 @@ def _append_sampler(
         distance, unit = DISTANCE, UNIT
     else:
         body, places = find_body(graph, iuv), find_places(graph, iuv)
-        sampled = look_up(graph, FEATURE_MAP, places, body)
+        grid = graph("Sub", graph("Mul", places, 2), 1)
+        sampled = look_up(graph, FEATURE_MAP, grid, body)
         scale = ""
         if config.clearance or config.has_detail:
             scale = pixels_per_texel(graph, places, body)
         if config.has_detail:
-            finer = look_up(graph, DETAIL, places, body)
+            finer = look_up(graph, DETAIL, grid, body)
             share = detail_share(graph, scale, config.finest_texture)
             own = graph.part(sampled, 0, COLOUR_CHANNELS)
             colours = graph("Add", own, graph("Mul", finer, share))
