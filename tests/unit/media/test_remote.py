@@ -45,6 +45,27 @@ def test_messages_hold_no_secrets() -> None:
     assert shown == "https://host/a.png"
 
 
+def test_a_pattern_finds_urls_as_they_would_be_written(memory) -> None:
+    memory.pipe({"/in/b.png": b"", "/in/a.png": b"", "/in/c.jpg": b""})
+    assert remote.find_urls("memory://in/*.png") == ["memory://in/a.png", "memory://in/b.png"]
+
+
+def test_a_pattern_keeps_its_host_and_user(memory) -> None:
+    class Host(fsspec.get_filesystem_class("memory")):
+        """As those of SFTP and FTP: a path, by which the host is not told."""
+
+        protocol = "host"
+
+        @classmethod
+        def _strip_protocol(cls, path: str) -> str:
+            return super()._strip_protocol(path.removeprefix("host://me@there:22"))
+
+    fsspec.register_implementation("host", Host, clobber=True)
+    memory.pipe({"/in/a.png": b"photo", "/in/b.png": b""})
+    found = remote.find_urls("host://me@there:22/in/*.png")
+    assert found == ["host://me@there:22/in/a.png", "host://me@there:22/in/b.png"]
+
+
 def test_each_url_is_fetched_once_and_goes_at_the_end(memory, monkeypatch) -> None:
     memory.pipe({"/in/me.png": b"photo", "/in/me_IUV.png": b"iuv", "/in/other.png": b"no"})
     fetched = []
