@@ -220,6 +220,11 @@ class ModelConfig:
         return self.colour_shortcut and self.has_feature_net and self.variant != "cbi"
 
     @property
+    def told_scale(self) -> bool:
+        """Whether it matters how large a body is in its image."""
+        return self.clearance or self.has_detail
+
+    @property
     def finest_texture(self) -> int:
         """Side of the largest partial texture that is of use, texels."""
         return self.texture_size * (DETAIL_FACTOR if self.has_detail else 1)

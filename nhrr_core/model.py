@@ -277,7 +277,9 @@ class NeuralReRenderer(nn.Module):
         config = self.config
         looked_up, picture = feature_map.tensor_split([config.sampled_channels], dim=1)
         features = sample_features(looked_up, target_iuv, self.charts)
-        scale = pixels_per_texel(target_iuv, self.charts)
+        scale = features.new_ones(len(features))
+        if config.told_scale:
+            scale = pixels_per_texel(target_iuv, self.charts)
         if detail is not None:
             finer = sample_features(detail, target_iuv, self.charts)
             share = detail_share(scale, detail.shape[-1])

@@ -150,7 +150,7 @@ class GraphEngine(ABC):
     def _inputs(
         self, feature_map: FeatureRows, iuv: UInt8[np.ndarray, "S S 3"]
     ) -> dict[str, np.ndarray]:
-        scale = pixels_per_texel(iuv)
+        scale = pixels_per_texel(iuv) if self.config.told_scale else 1.0
         inputs = {IUV: np.ascontiguousarray(iuv[None]), SAMPLED: feature_map.look_up(iuv, scale)}
         if self.config.geometry:
             inputs[DISTANCE] = signed_distance(iuv)[None, None]

@@ -230,9 +230,7 @@ def _append_sampler(
         body, places = find_body(graph, iuv), find_places(graph, iuv)
         grid = graph("Sub", graph("Mul", places, 2), 1)
         sampled = look_up(graph, FEATURE_MAP, grid, body)
-        scale = ""
-        if config.clearance or config.has_detail:
-            scale = pixels_per_texel(graph, places, body)
+        scale = pixels_per_texel(graph, places, body) if config.told_scale else ""
         if config.has_detail:
             finer = look_up(graph, DETAIL, grid, body)
             share = detail_share(graph, scale, config.finest_texture)
