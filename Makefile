@@ -17,7 +17,7 @@ demo: $(VENV)/.installed  ## render the shipped photo with the shipped motion, t
 	$(BIN)/mt demo --photo-alone --output astronaut.mp4 --force
 
 test: $(VENV)/.installed-dev  ## run the tests
-	$(BIN)/python -m pytest --numprocesses auto
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 docs: $(VENV)/.installed-dev  ## the documentation as a site, in build/site: a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --config-file tools/docs/mkdocs.yml

@@ -14,7 +14,15 @@ from typing import Any, Self
 from motion_transfer.batch.events import BatchEvent, BatchListener, JobDone, JobFailed
 from motion_transfer.batch.job import Job
 from motion_transfer.errors import InputError, MotionTransferError
-from motion_transfer.media.remote import exists, fetch, name_of, same_size, send, shown_url
+from motion_transfer.media.remote import (
+    exists,
+    fetch,
+    name_of,
+    same_size,
+    send,
+    shown_url,
+    url_beside,
+)
 from motion_transfer.media.work import key_of
 
 AT_ONCE = 8
@@ -85,8 +93,7 @@ class RemoteInputs:
         try:
             fetch(url, path, "input")
             for name in beside(url) if "?" not in url else ():
-                other = url.removesuffix(url.rstrip("/").rpartition("/")[2]) + name
-                if exists(other):
+                if exists(other := url_beside(url, name)):
                     fetch(other, path.with_name(name), "input")
         except (MotionTransferError, OSError) as error:
             return str(error)

@@ -44,6 +44,12 @@ def name_of(url: str) -> str:
     return name
 
 
+def url_beside(url: str, name: str) -> str:
+    """Spell what lies under another name in the same folder as a URL."""
+    folder, slash, _ = url.rstrip("/").rpartition("/")
+    return f"{folder}{slash}{name}"
+
+
 def find_urls(pattern: str) -> list[str]:
     """List what a URL with `*` stands for, in order. Raises: InputError, FetchError."""
     with _explained(pattern, "listed"):
@@ -183,7 +189,7 @@ class Fetched:
             target = place / name_of(url)
             fetch(url, target, what)
             for name in beside:
-                other = url[: -len(PurePosixPath(urlsplit(url).path).name)] + name
+                other = url_beside(url, name)
                 if "?" not in url and exists(other):  # what is signed is signed alone
                     fetch(other, place / name, what)
             self._made[url] = target

@@ -45,6 +45,19 @@ def test_messages_hold_no_secrets() -> None:
     assert shown == "https://host/a.png"
 
 
+@pytest.mark.parametrize(
+    ("url", "expected"),
+    [
+        ("s3://bucket/in/me.png", "s3://bucket/in/me_IUV.png"),
+        ("s3://bucket/in/turn/", "s3://bucket/in/me_IUV.png"),
+        ("memory://me.png", "memory://me_IUV.png"),
+        ("s3://bucket/a%20b.png", "s3://bucket/me_IUV.png"),
+    ],
+)
+def test_what_lies_beside_a_url(url: str, expected: str) -> None:
+    assert remote.url_beside(url, "me_IUV.png") == expected
+
+
 def test_a_pattern_finds_urls_as_they_would_be_written(memory) -> None:
     memory.pipe({"/in/b.png": b"", "/in/a.png": b"", "/in/c.jpg": b""})
     assert remote.find_urls("memory://in/*.png") == ["memory://in/a.png", "memory://in/b.png"]
