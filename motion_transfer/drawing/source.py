@@ -21,8 +21,13 @@ from motion_transfer.drawing.person import (
     occupancy,
 )
 from motion_transfer.drawing.textures import enlarge, merge_textures, pick_nearest
-from motion_transfer.drawing.unfolding import extract_texture, keep_parts
-from motion_transfer.drawing.views import View, merge_views, rate_texels
+from motion_transfer.drawing.unfolding import (
+    extract_texture,
+    keep_parts,
+    texel_index,
+    texture_coordinates,
+)
+from motion_transfer.drawing.views import HEAD, View, merge_views, rate_texels
 from motion_transfer.drawing.window import BEYOND_THE_PHOTO, cut_picture, plan_window
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.blends import BlendMeter
@@ -37,6 +42,8 @@ BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the backgr
 CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
+RIM_SHARE, RIM_LEVELS = 0.08, 90  # of the head's size, the root of its area; of 255: by eye
+MOUTH_METRES = 0.38  # see `UVTables.position`: higher up hair grows on heads
 SOLID_ALPHA = 192  # of 255; less is mixed with the background
 LEAST_RATING = 0.01  # of a view, in the units of `View.rating`
 DENSE_TEXELS = 512  # a side; finer textures may miss texels, which are then as coarse as the map
@@ -253,7 +260,7 @@ def unfold_picture(
         max(0, box.left - margin) : box.right + margin,
     ]
     rgb, own = np.ascontiguousarray(photo.rgb[body]), np.ascontiguousarray(iuv[body])
-    trimmed = trim_outline(rgb, own) if alpha is None else trim_to_alpha(own, alpha[body])
+    trimmed = trim(rgb, own, None if alpha is None else alpha[body])
     colours = rgb / np.float32(127.5) - 1
     return extract_texture(
         colours,
@@ -261,6 +268,50 @@ def unfold_picture(
         texture_size,
         samples_per_texel=SAMPLES_PER_TEXEL if texture_size <= DENSE_TEXELS else 1,
     )
+
+
+def trim(
+    rgb: UInt8[np.ndarray, "H W 3"],
+    iuv: UInt8[np.ndarray, "H W 3"],
+    alpha: UInt8[np.ndarray, "H W"] | None,
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Leave the IUV where a photo shows just that, neither background nor hair before a body.
+
+    Args:
+        alpha: How much of each pixel is the person; None: its colours have to tell.
+    """
+    trimmed = trim_outline(rgb, iuv) if alpha is None else trim_to_alpha(iuv, alpha)
+    return trim_head(rgb, trimmed)
+
+
+def trim_head(
+    rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Take hair that hangs beside a jaw or a neck out of the IUV: it would be drawn on their sides.
+
+    Only the rim of what lies lower than the mouth is doubted, where its colour is far from the one
+    farther in.
+    """
+    head = np.isin(iuv[..., 0], HEAD)
+    left, top, width, height = cv2.boundingRect(head.astype(np.uint8))
+    around = np.s_[max(0, top - 1) : top + height + 1, max(0, left - 1) : left + width + 1]
+    head, rgb, own = head[around], rgb[around], iuv[around]
+    depth = cv2.distanceTransform(head.astype(np.uint8), cv2.DIST_L2, 3)
+    inner = head & (depth > RIM_SHARE * np.count_nonzero(head) ** 0.5)
+    if not inner.any():
+        return iuv
+    apart = cv2.absdiff(rgb, take_nearest(rgb, ~inner)).mean(2)
+    doubted = head & ~inner & (apart > RIM_LEVELS)
+    doubted[doubted] = _heights(own[doubted]) < MOUTH_METRES
+    trimmed = iuv.copy()
+    trimmed[around][doubted] = 0
+    return trimmed
+
+
+def _heights(iuv: UInt8[np.ndarray, "N 3"]) -> Float32[np.ndarray, " N"]:
+    """How high each pixel lies on the body, metres, see `UVTables.position`."""
+    heights = load_uv_tables().position[..., 1]
+    return heights.ravel()[texel_index(texture_coordinates(iuv), len(heights))]
 
 
 def trim_to_alpha(

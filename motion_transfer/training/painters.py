@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float16, UInt8
 
 from motion_transfer.drawing.outline import clearance_of
-from motion_transfer.drawing.source import SourcePicture, cut_source, trim_to_alpha
+from motion_transfer.drawing.source import SourcePicture, cut_source, trim
 from motion_transfer.errors import MotionTransferError, TrainingError
 from motion_transfer.processes import begin_child, deaf
 from motion_transfer.training.config import TrainConfig
@@ -83,7 +83,7 @@ class Painter:
             read = np.empty((PICTURE_CHANNELS, 0, 0), np.uint8)
             if self.config.model.reads_photo:
                 read = cut_source(shown, size)
-            trimmed = trim_to_alpha(picture.iuv, picture.alpha)
+            trimmed = trim(picture.rgb, picture.iuv, picture.alpha)
             flat = (picture.rgb, trimmed, crop.rgb, crop.iuv, crop.alpha[..., None])
             photo, photo_iuv, image, iuv, alpha = (plane.transpose(2, 0, 1) for plane in flat)
             views.append((photo, photo_iuv, clearance.astype(np.float16), image, iuv, alpha, read))

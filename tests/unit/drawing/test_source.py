@@ -13,6 +13,7 @@ from motion_transfer.drawing.source import (
     SOLID_ALPHA,
     Source,
     SourcePicture,
+    trim_head,
     trim_outline,
     trim_to_alpha,
     unfold_picture,
@@ -73,6 +74,33 @@ def test_hair_that_leaves_the_outline_stays_in_it(studio) -> None:
     photo[hair] = (40, 30, 20)
     trimmed = trim_outline(photo, iuv)[..., 0] > 0
     assert trimmed[hair & (head > 0)].mean() > 0.6
+
+
+@pytest.mark.parametrize(
+    ("level", "edge", "goes"),
+    [
+        ("neck", (40, 30, 20), True),
+        ("neck", (180, 140, 120), False),
+        ("crown", (40, 30, 20), False),
+    ],
+    ids=["hair beside a neck", "skin in the shade", "hair where it grows"],
+)
+def test_the_rim_of_a_head(level: str, edge: tuple[int, int, int], goes: bool) -> None:
+    heights = load_uv_tables().position[..., 1]
+    charts = load_uv_tables().charts[HEAD[0] - 1]  # V, U -> place
+    column, row = (charts.reshape(-1, 2) * len(heights)).astype(int).clip(0, 255).T
+    choose = np.argmin if level == "neck" else np.argmax
+    v, u = divmod(int(choose(heights[row, column])), charts.shape[1])
+    iuv = np.zeros((90, 90, 3), np.uint8)
+    iuv[20:70, 20:70] = HEAD[0], u, v
+    photo = np.full((90, 90, 3), 200, np.uint8)
+    photo[22:68, 22:68] = 215, 175, 150
+    photo[22:68, 66:68] = photo[40:50, 40:50] = edge
+    photo[22:68, 68:] = edge
+    trimmed = trim_head(photo, iuv)[..., 0] > 0
+    assert trimmed[24:66, 66:70].any() != goes
+    assert trimmed[24:66, 24:66].all()
+    assert trim_head(photo, np.zeros_like(iuv)).sum() == 0
 
 
 def test_alpha_says_where_the_person_ends(studio) -> None:

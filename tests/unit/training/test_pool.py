@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import torch
 
-from motion_transfer.drawing.source import SourcePicture, trim_to_alpha, unfold_picture
+from motion_transfer.drawing.source import SourcePicture, trim, unfold_picture
 from motion_transfer.errors import InputError, TrainingError
 from motion_transfer.training.config import TrainConfig, build_config
 from motion_transfer.training.painters import MOST_SKIPPED, PaintedPerson, Painter, Painters
@@ -147,9 +147,8 @@ def test_a_painter_trims_and_cuts_as_everybody_does(body_model) -> None:
     again = Painter(people, config)(1)
     assert all((getattr(painted, name) == getattr(again, name)).all() for name in vars(painted))
     picture = people[1].source.load()
-    assert (
-        painted.photo_iuv[0] == trim_to_alpha(picture.iuv, picture.alpha).transpose(2, 0, 1)
-    ).all()
+    trimmed = trim(picture.rgb, picture.iuv, picture.alpha)
+    assert (painted.photo_iuv[0] == trimmed.transpose(2, 0, 1)).all()
     crop = cut_target(picture, 64, config.data, np.random.default_rng((0, 1, 1)))
     assert (painted.image[0] == crop.rgb.transpose(2, 0, 1)).all()
     assert unfold_picture(SourcePicture(picture.as_photo(), picture.iuv), 64)[1].any()
