@@ -54,12 +54,12 @@ def find_urls(pattern: str) -> list[str]:
     """List what a URL with `*` stands for, in order. Raises: InputError, FetchError."""
     with _explained(pattern, "listed"):
         files, path = _open(pattern)
+        found = files.glob(path)
         # a path alone says neither host nor user, and one file is to have one URL
         before, known, after = pattern.partition(path.lstrip("/"))
-        spell = files.unstrip_protocol
-        if known:
-            spell = lambda name: before + name.lstrip("/") + after  # noqa: E731
-        return sorted(map(spell, files.glob(path)))
+        if not known:
+            return sorted(map(files.unstrip_protocol, found))
+        return sorted(f"{before}{name.lstrip('/')}{after}" for name in found)
 
 
 def exists(url: str) -> bool:
