@@ -6,48 +6,33 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from motion_transfer.drawing.outline import clearance_of, grab_cut
+from motion_transfer.drawing.outline import clearance_of
 from motion_transfer.drawing.person import (
     COVERS,
     bounding_box,
     choose_person,
-    disc,
     find_people,
     isolate,
-    occupancy,
 )
 from motion_transfer.drawing.textures import enlarge, merge_textures, pick_nearest
-from motion_transfer.drawing.unfolding import (
-    extract_texture,
-    keep_parts,
-    texel_index,
-    texture_coordinates,
-)
-from motion_transfer.drawing.views import HEAD, View, merge_views, rate_texels
+from motion_transfer.drawing.trimming import trim
+from motion_transfer.drawing.unfolding import extract_texture, keep_parts
+from motion_transfer.drawing.views import View, merge_views, rate_texels
 from motion_transfer.drawing.window import BEYOND_THE_PHOTO, cut_picture, plan_window
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.opening import read_single_iuv
-from motion_transfer.media.nearest import take_nearest
 from motion_transfer.media.pictures.photo import Photo
 from nhrr_core import ALL_PARTS, PART_NAMES, load_uv_tables
 from nhrr_core.uv_tables import SAMPLES_PER_TEXEL
 
-BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
-CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
-TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
-SURROUNDINGS_SHARE = 0.15  # likewise: enough background around the person to know its colours
-RIM_SHARE, RIM_LEVELS = 0.08, 90  # of the head's size, the root of its area; of 255: by eye
-MOUTH_METRES = 0.38  # see `UVTables.position`: higher up hair grows on heads
-SOLID_ALPHA = 192  # of 255; less is mixed with the background
+SURROUNDINGS_SHARE = 0.15  # of the person's height: enough background around to know its colours
 LEAST_RATING = 0.01  # of a view, in the units of `View.rating`
 DENSE_TEXELS = 512  # a side; finer textures may miss texels, which are then as coarse as the map
-GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
 
 
 @dataclass(frozen=True)
@@ -268,101 +253,6 @@ def unfold_picture(
         texture_size,
         samples_per_texel=SAMPLES_PER_TEXEL if texture_size <= DENSE_TEXELS else 1,
     )
-
-
-def trim(
-    rgb: UInt8[np.ndarray, "H W 3"],
-    iuv: UInt8[np.ndarray, "H W 3"],
-    alpha: UInt8[np.ndarray, "H W"] | None,
-) -> UInt8[np.ndarray, "H W 3"]:
-    """Leave the IUV where a photo shows just that, neither background nor hair before a body.
-
-    Args:
-        alpha: How much of each pixel is the person; None: its colours have to tell.
-    """
-    trimmed = trim_outline(rgb, iuv) if alpha is None else trim_to_alpha(iuv, alpha)
-    return trim_head(rgb, trimmed)
-
-
-def trim_head(
-    rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
-) -> UInt8[np.ndarray, "H W 3"]:
-    """Take hair that hangs beside a jaw or a neck out of the IUV: it would be drawn on their sides.
-
-    Only the rim of what lies lower than the mouth is doubted, where its colour is far from the one
-    farther in.
-    """
-    head = np.isin(iuv[..., 0], HEAD)
-    left, top, width, height = cv2.boundingRect(head.astype(np.uint8))
-    around = np.s_[max(0, top - 1) : top + height + 1, max(0, left - 1) : left + width + 1]
-    head, rgb, own = head[around], rgb[around], iuv[around]
-    depth = cv2.distanceTransform(head.astype(np.uint8), cv2.DIST_L2, 3)
-    inner = head & (depth > RIM_SHARE * np.count_nonzero(head) ** 0.5)
-    if not inner.any():
-        return iuv
-    apart = cv2.absdiff(rgb, take_nearest(rgb, ~inner)).mean(2)
-    doubted = head & ~inner & (apart > RIM_LEVELS)
-    doubted[doubted] = _heights(own[doubted]) < MOUTH_METRES
-    trimmed = iuv.copy()
-    trimmed[around][doubted] = 0
-    return trimmed
-
-
-def _heights(iuv: UInt8[np.ndarray, "N 3"]) -> Float32[np.ndarray, " N"]:
-    """How high each pixel lies on the body, metres, see `UVTables.position`."""
-    heights = load_uv_tables().position[..., 1]
-    return heights.ravel()[texel_index(texture_coordinates(iuv), len(heights))]
-
-
-def trim_to_alpha(
-    iuv: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"]
-) -> UInt8[np.ndarray, "H W 3"]:
-    """Keep the IUV where alpha is solid, but for the outermost pixels, where colours mix."""
-    solid = (alpha >= SOLID_ALPHA).astype(np.uint8)
-    # what the photo's edge cuts off does not mix with a background
-    reach = disc(bounding_box(iuv).height * TRIM_SHARE)
-    return iuv * cv2.erode(solid, reach, borderValue=1)[..., None]
-
-
-def trim_outline(
-    rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
-) -> UInt8[np.ndarray, "H W 3"]:
-    """Take the background that strays into an outline out of its IUV.
-
-    Only a band along the outline is doubted. In it, GrabCut (Rother et al., SIGGRAPH 2004) decides
-    by colour, and the outermost pixels, where photo and outline mix, always go. What lies just
-    outside may be hair: the background's colours are those farther away.
-    """
-    mask = occupancy(iuv)
-    height = bounding_box(iuv).height
-    if not height:
-        return iuv
-    scale = min(1, GRABCUT_HEIGHT / height)
-    small = max(1, round(mask.shape[1] * scale)), max(1, round(mask.shape[0] * scale))
-    labels = _cut_out(
-        cv2.resize(rgb, small, interpolation=cv2.INTER_AREA),
-        cv2.resize(mask, small, interpolation=cv2.INTER_NEAREST),
-        height * scale,
-    )
-    person = mask & cv2.resize(labels, mask.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    return iuv * cv2.erode(person, disc(height * TRIM_SHARE))[..., None]
-
-
-def _cut_out(
-    rgb: UInt8[np.ndarray, "H W 3"], mask: UInt8[np.ndarray, "H W"], height: float
-) -> UInt8[np.ndarray, "H W"]:
-    """Mark with 1 where a person of that height, px, is, by colour along a rough mask's outline."""
-    band = height * BAND_SHARE
-    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 3)
-    thickness = cv2.dilate(depth, disc(band))
-    inner = depth >= np.minimum(band, thickness / 2)  # a limb thinner than the band keeps its core
-    near = cv2.dilate(mask, disc(height * CLEAR_SHARE)) > 0
-    if near.all():
-        return mask
-    labels = np.where(mask, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
-    labels[inner & (mask > 0)] = cv2.GC_FGD
-    surroundings = np.where(mask[..., None], rgb, take_nearest(rgb, near))
-    return grab_cut(surroundings, labels)
 
 
 def read_person(

@@ -18,7 +18,8 @@ import numpy as np
 from jaxtyping import Float16, UInt8
 
 from motion_transfer.drawing.outline import clearance_of
-from motion_transfer.drawing.source import SourcePicture, cut_source, trim
+from motion_transfer.drawing.source import SourcePicture, cut_source
+from motion_transfer.drawing.trimming import trim
 from motion_transfer.errors import MotionTransferError, TrainingError
 from motion_transfer.processes import begin_child, deaf
 from motion_transfer.training.config import TrainConfig

@@ -9,17 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motion_transfer.drawing.source import (
-    SOLID_ALPHA,
-    Source,
-    SourcePicture,
-    trim_head,
-    trim_outline,
-    trim_to_alpha,
-    unfold_picture,
-)
+from motion_transfer.drawing.source import Source
 from motion_transfer.errors import InputError
-from motion_transfer.media.pictures.photo import Photo
 from motion_transfer.render.options import Garment, SourceOptions, parse_parts
 from motion_transfer.render.source import read_source
 from nhrr_core import load_uv_tables
@@ -50,75 +41,6 @@ def test_parts_take_their_colours_from_the_photo(studio, order: str) -> None:
     assert colour_of(source, TORSO) == list(RED)
     assert colour_of(source, HEAD) == list(YELLOW)
     assert colour_of(source, (1,)) is None  # the back
-
-
-def test_an_outline_that_strays_is_trimmed(studio) -> None:
-    """The IUV reaches two pixels over the backdrop, which may not enter the texture."""
-    true = studio.iuv(scale=4, size=(384, 256))
-    photo = studio.dress(true)
-    rough = np.maximum(true, np.roll(true, 2, axis=1))
-    trimmed = trim_outline(photo, rough)[..., 0] > 0
-    person = true[..., 0] > 0
-    assert (trimmed & ~person).sum() < 0.01 * ((rough[..., 0] > 0) & ~person).sum()
-    assert trimmed.sum() > 0.9 * person.sum()
-
-
-def test_hair_that_leaves_the_outline_stays_in_it(studio) -> None:
-    """Hair lies over the head's outline, on both sides; it is no background for that."""
-    iuv = studio.iuv(scale=4, size=(384, 256))
-    photo = studio.dress(iuv)
-    head = np.isin(iuv[..., 0], HEAD).astype(np.uint8)
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (17, 17))
-    hair = (cv2.dilate(head, disc) - cv2.erode(head, disc[3:-3, 3:-3])) > 0
-    hair &= (head > 0) | (iuv[..., 0] == 0)
-    photo[hair] = (40, 30, 20)
-    trimmed = trim_outline(photo, iuv)[..., 0] > 0
-    assert trimmed[hair & (head > 0)].mean() > 0.6
-
-
-@pytest.mark.parametrize(
-    ("level", "edge", "goes"),
-    [
-        ("neck", (40, 30, 20), True),
-        ("neck", (180, 140, 120), False),
-        ("crown", (40, 30, 20), False),
-    ],
-    ids=["hair beside a neck", "skin in the shade", "hair where it grows"],
-)
-def test_the_rim_of_a_head(level: str, edge: tuple[int, int, int], goes: bool) -> None:
-    heights = load_uv_tables().position[..., 1]
-    charts = load_uv_tables().charts[HEAD[0] - 1]  # V, U -> place
-    column, row = (charts.reshape(-1, 2) * len(heights)).astype(int).clip(0, 255).T
-    choose = np.argmin if level == "neck" else np.argmax
-    v, u = divmod(int(choose(heights[row, column])), charts.shape[1])
-    iuv = np.zeros((90, 90, 3), np.uint8)
-    iuv[20:70, 20:70] = HEAD[0], u, v
-    photo = np.full((90, 90, 3), 200, np.uint8)
-    photo[22:68, 22:68] = 215, 175, 150
-    photo[22:68, 66:68] = photo[40:50, 40:50] = edge
-    photo[22:68, 68:] = edge
-    trimmed = trim_head(photo, iuv)[..., 0] > 0
-    assert trimmed[24:66, 66:70].any() != goes
-    assert trimmed[24:66, 24:66].all()
-    assert trim_head(photo, np.zeros_like(iuv)).sum() == 0
-
-
-def test_alpha_says_where_the_person_ends(studio) -> None:
-    """Backdrop and person in one colour: only alpha can tell; the solid part of it counts."""
-    iuv = studio.iuv(scale=4, size=(384, 256))
-    person = iuv[..., 0] > 0
-    alpha = person.astype(np.uint8) * 255
-    columns = np.flatnonzero(person.any(0))
-    middle = (columns.min() + columns.max()) // 2
-    alpha[:, middle:] = np.where(person[:, middle:], SOLID_ALPHA - 1, 0)
-    trimmed = trim_to_alpha(iuv, alpha)[..., 0] > 0
-    assert not trimmed[:, middle - 1 :].any()
-    assert trimmed[:, :middle].sum() > 0.9 * person[:, :middle].sum()
-    photo = Photo(Path("a.png"), np.full((*alpha.shape, 3), 99, np.uint8), alpha, turned=False)
-    parts = tuple(np.unique(iuv[person][:, 0]).tolist())
-    seen = unfold_picture(SourcePicture(photo, iuv, parts=parts), SIZE)[1].sum()
-    whole = SourcePicture(photo, iuv, np.full_like(alpha, 255), parts)
-    assert 0 < seen < unfold_picture(whole, SIZE)[1].sum()
 
 
 @pytest.mark.parametrize("word", ["IUV", "iuv"])

@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 import torch
 
-from motion_transfer.drawing.source import SourcePicture, trim, unfold_picture
+from motion_transfer.drawing.source import SourcePicture, unfold_picture
+from motion_transfer.drawing.trimming import trim
 from motion_transfer.errors import InputError, TrainingError
 from motion_transfer.training.config import TrainConfig, build_config
 from motion_transfer.training.painters import MOST_SKIPPED, PaintedPerson, Painter, Painters
