@@ -10,7 +10,7 @@ from motion_transfer.events import Listener, ignore
 from motion_transfer.media.iuv.formats import ChannelOrder, DriverKind, Missing
 from motion_transfer.option import parse_frames, parse_path, parse_rate
 from motion_transfer.render.memory import AnyPath, list_paths, read_path
-from motion_transfer.render.options import Garment, Partner, RenderOptions
+from motion_transfer.render.options import Garment, Legs, Partner, RenderOptions
 from motion_transfer.render.run import RenderReport, run
 
 
@@ -22,6 +22,7 @@ def render_video(
     source_iuv: AnyPath | Sequence[AnyPath] | None = None,
     person: str = "largest",
     source_iuv_order: ChannelOrder | None = None,
+    unseen_legs: Legs = "jeans",
     garments: Sequence[Garment] = (),
     driver_kind: DriverKind | None = None,
     driver_person: str = "largest",
@@ -80,6 +81,7 @@ def render_video(
             there is none.
         person: `largest`, an index from the left (0 first), or a box `x0,y0,x1,y1` in px.
         source_iuv_order: Channels of the source's and garments' IUV files; else found out.
+        unseen_legs: What legs wear that no source shows: jeans, or the network's guess.
         garments: Parts taken from other photos.
         driver_kind: `iuv` or `pictures`; else found out.
         driver_person: Whom to follow, as `person`.
@@ -138,6 +140,7 @@ def render_video(
             source_iuv=list_paths(source_iuv),
             person=person,
             source_iuv_order=source_iuv_order,
+            unseen_legs=unseen_legs,
             garments=tuple(garments),
             driver=parse_path(driver),
             driver_kind=driver_kind,

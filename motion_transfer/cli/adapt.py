@@ -12,7 +12,6 @@ from motion_transfer.cli.options import (
     SectionCommand,
     described_options,
     events_option,
-    pair_words,
     section,
 )
 from motion_transfer.cli.progress import choose_listener
@@ -30,8 +29,6 @@ output_option = section("Output")
 @events_option()
 def adapt(
     output: Path,
-    garments: tuple[str, ...],
-    garment_parts: tuple[str, ...],
     quiet: bool,
     as_json: bool,
     **words: Any,
@@ -49,8 +46,7 @@ def adapt(
     """
     from motion_transfer.render.adapted import write_adapted
 
-    pairs = pair_words(garments, garment_parts, "garment", "parts")
-    options = options_from_words(AdaptOptions, {**words, "garments": pairs})
+    options = options_from_words(AdaptOptions, words)
     write_adapted(options, output, choose_listener(quiet=quiet, as_json=as_json))
     if not quiet and not as_json:
         tell(f"wrote {output}: {output.stat().st_size / 1e6:.1f} MB")

@@ -14,10 +14,11 @@ from motion_transfer.drawing.canvas import show_alpha
 from motion_transfer.drawing.renderers import DRAFT
 from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import encode_jpeg, encode_png
+from motion_transfer.option import part_of
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver
 from motion_transfer.preview.queue import FIRST, ByteCache, DrawQueue, StaleError
 from motion_transfer.preview.views import Views, read_proxy
-from motion_transfer.render.options import RenderOptions
+from motion_transfer.render.options import RenderOptions, SourceOptions
 
 CACHED_BYTES = 128 * 2**20  # of encoded pictures: some thousand of a small driver's
 SHARP_VIEWS = ("iuv", "texture", "map", "features")
@@ -94,7 +95,7 @@ class Pictures:
         }
         if view not in calls:
             raise InputError(f"view {view!r}; supported are {', '.join(calls)}")
-        name = options.renderer, tuple(options.sources), options.person, options.garments, view
+        name = options.renderer, part_of(options, SourceOptions), view
         return self.ask(name, calls[view], view)
 
     def ask(

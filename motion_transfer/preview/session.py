@@ -20,7 +20,7 @@ from motion_transfer.events import Event, FramesDone, Stage
 from motion_transfer.extras import missing_packages
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import SCENES
+from motion_transfer.option import SCENES, part_of
 from motion_transfer.people import is_motion
 from motion_transfer.preview.changes import SCENE, change_options
 from motion_transfer.preview.choices import Choice, built_in_motions, example_people
@@ -39,6 +39,7 @@ from motion_transfer.render.inputs import find_source_iuv, is_clip, iuv_names
 from motion_transfer.render.options import (
     Garment,
     RenderOptions,
+    SourceOptions,
     is_kept,
     parse_parts,
 )
@@ -152,7 +153,7 @@ class Session:
         """A digest of what pictures of frames depend on: it changes whenever one of them would."""
         o, plans = self.options, self.plans
         scene = [getattr(o, name) for name in SCENE]
-        who = (o.sources, o.person, o.garments, o.driver, o.driver_person)
+        who = (part_of(o, SourceOptions), o.driver, o.driver_person)
         planned = plans and (plans.shots, plans.exact, plans.chosen)
         drawn = (o.renderer, scene, o.size, who, o.missing, planned)
         return hashlib.sha256(repr(drawn).encode()).hexdigest()[:12]

@@ -75,6 +75,7 @@ def _source_key(
         {
             "content": [facts for _, facts in pictures],
             "parts": [garment.parts for garment in options.garments],
+            "legs": options.unseen_legs,
             "person": options.person,
             "order": options.source_iuv_order,
             "renderer": [recipe.name, recipe.content, recipe.execution],

@@ -41,12 +41,13 @@ from motion_transfer.render.frames import FrameDrawer
 from motion_transfer.render.options import (
     EstimatorOptions,
     Garment,
+    Legs,
     RendererOptions,
     RenderOptions,
     SourceOptions,
 )
 from motion_transfer.render.plan import frame_range, scan_people
-from motion_transfer.render.source import check_photos, check_visible, read_source
+from motion_transfer.render.source import check_photos, check_visible, clothe_legs, read_source
 from motion_transfer.render.source_pictures import estimate_person, show_estimate
 from motion_transfer.weights import DEFAULT_WEIGHTS, find_pretrained
 from motion_transfer.weights.pretrained import save_pretrained
@@ -147,6 +148,7 @@ class MotionTransfer:
         *,
         person: str = "largest",
         iuv_order: ChannelOrder | None = None,
+        unseen_legs: Legs = "jeans",
         garments: Sequence[Garment] = (),
         estimator: str = "blazepose",
         estimator_model: AnyPath | None = None,
@@ -159,6 +161,7 @@ class MotionTransfer:
             iuv: Its IUV, of the same kind; None: it is looked for beside a file, and else
                 estimated.
             iuv_order: The channels of the IUV, and of garments'; else found out.
+            unseen_legs: As that of `render_video`.
             listener: Told what the user should know, see `motion_transfer.events`.
         Raises: InputError and its kinds.
         """
@@ -170,6 +173,7 @@ class MotionTransfer:
             options = EstimatorOptions(estimator=estimator, estimator_model=model)
             found = unfold_source([_take_photo(source, iuv, iuv_order, person, options)], size)
             check_visible(found, str(PHOTO))
+            (found,) = clothe_legs([found], unseen_legs)
         else:
             if isinstance(iuv, np.ndarray):
                 raise InputError("a photo in a file takes its IUV from a file; give its path")
@@ -178,6 +182,7 @@ class MotionTransfer:
                 source_iuv=list_paths(iuv),
                 person=person,
                 source_iuv_order=iuv_order,
+                unseen_legs=unseen_legs,
                 garments=tuple(garments),
                 estimator=estimator,
                 estimator_model=model,

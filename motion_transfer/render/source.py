@@ -3,15 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
 
 from motion_transfer.drawing.kept_source import load_source
-from motion_transfer.drawing.source import Source, SourcePicture, dress, undress, unfold_source
+from motion_transfer.drawing.source import (
+    Source,
+    SourcePicture,
+    dress,
+    read_person,
+    undress,
+    unfold_source,
+)
+from motion_transfer.drawing.textures import pick_nearest
 from motion_transfer.errors import InputError
 from motion_transfer.events import Listener, ignore
 from motion_transfer.media.pictures.photo import read_photo
-from motion_transfer.render.options import Garment, SourceOptions
+from motion_transfer.render.options import Garment, Legs, SourceOptions
 from motion_transfer.render.source_pictures import find_person, read_pictures
-from nhrr_core.parts import ALL_PARTS
+from nhrr_core import load_uv_tables
+from nhrr_core.parts import ALL_PARTS, PART_GROUPS
+
+LEG_PARTS = (*PART_GROUPS["upper-legs"], *PART_GROUPS["lower-legs"])
+SMALLEST_LEG_SHARE = 0.015
+"""Of the legs' texels: from less, which is a hand's breadth of trousers, the network does not tell
+that they are trousers. Cut at mid-thigh, a photo shows 0.05, a whole person 0.1 to 0.2."""
 
 SMALLEST_VISIBLE_SHARE = 0.01  # of the texels; a frontal half-length portrait shows about 0.2
 
@@ -55,7 +75,37 @@ def read_sources(
     ]
     sources = [dress(person, garments) for person in people]
     check_visible(sources[0], options.source_words)
-    return sources
+    return clothe_legs(sources, options.unseen_legs)
+
+
+def clothe_legs(sources: Sequence[Source], legs: Legs) -> list[Source]:
+    """Lay the demo's jeans and shoes over legs that a person does not show, if that is asked for.
+
+    FeatureNet's own guess is the mean of all that could be there, which nobody wears.
+
+    Args:
+        sources: One person, for several sizes of texture; the first says what they show.
+    """
+    first = sources[0]
+    on_legs = np.isin(load_uv_tables().part, LEG_PARTS)
+    seen = first.visibility[0][pick_nearest(on_legs, first.visibility.shape[-1])]
+    if legs == "guess" or seen.mean() >= SMALLEST_LEG_SHARE:
+        return list(sources)
+    jeans = _read_jeans()
+    note = (
+        f"{first.photo.path} shows no legs: they wear jeans; --garment takes clothes from another"
+        " photo, --unseen-legs guess leaves them to the network"
+    )
+    dressed = [dress(undress(source, jeans.parts), [jeans]) for source in sources]
+    return [replace(source, notes=(*source.notes, note)) for source in dressed]
+
+
+@cache
+def _read_jeans() -> SourcePicture:
+    demo = Path(str(files("motion_transfer.demo")))
+    photo = read_photo(demo / "source.png")
+    iuv = read_person(photo, demo / "source_IUV.png", "largest", None, "demo")
+    return SourcePicture(photo, iuv, parts=(*LEG_PARTS, *PART_GROUPS["feet"]))
 
 
 def check_visible(source: Source, name: str) -> None:

@@ -95,10 +95,6 @@ MISTAKES = {
     "nobody": (["--source", "{empty}"], "no person in it"),
     "no photo": (["--source", "{folder}/none.png"], "none.png does not exist"),
     "no weights": (["--source", "{photo}", "--weights", "{folder}/none.safetensors"], "none"),
-    "garments": (
-        ["--source", "{photo}", "--garment", "{photo}", "--garment-parts", "torso"],
-        "weights learn a person, and no garments",
-    ),
     "no steps": (["--source", "{photo}", "--steps", "0"], "steps is 0; it must be at least 1"),
     "another ending": (["--source", "{photo}", "-o", "{folder}/me.pt"], "end in .safetensors"),
     "something is there": (["--source", "{photo}", "-o", "{photo}"], "end in .safetensors"),

@@ -16,12 +16,14 @@ from motion_transfer.option import option
 from motion_transfer.render.options.drawn import RendererOptions
 from motion_transfer.render.options.inputs import (
     KEPT_SUFFIX,
+    LEGS,
     AdaptOptions,
     DriverOptions,
     EstimatorOptions,
     Garment,
     InputOptions,
     KeepOptions,
+    Legs,
     SourceOptions,
     is_kept,
     parse_parts,
@@ -34,6 +36,7 @@ from motion_transfer.render.options.scene import Partner, SceneOptions
 __all__ = [
     "DEFAULT_RATE",
     "KEPT_SUFFIX",
+    "LEGS",
     "NO_AUDIO",
     "SIZES",
     "AdaptOptions",
@@ -42,6 +45,7 @@ __all__ = [
     "Garment",
     "InputOptions",
     "KeepOptions",
+    "Legs",
     "OutputOptions",
     "Partner",
     "RenderOptions",

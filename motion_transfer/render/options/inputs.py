@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 from motion_transfer.devices import check_device
 from motion_transfer.errors import InputError
@@ -21,6 +21,9 @@ from motion_transfer.media.iuv.formats import (
 )
 from motion_transfer.option import LONGEST_SHOWN, REQUIRED, option, read_whole, some_path
 from motion_transfer.render.options.part import Part
+
+Legs = Literal["jeans", "guess"]
+LEGS: tuple[Legs, ...] = get_args(Legs)
 
 KEPT_SUFFIX = ".mtsource"
 SMALLEST_WINDOW, LARGEST_WINDOW = 16, 16384
@@ -100,6 +103,14 @@ class SourceOptions(EstimatorOptions):
         choices=CHANNEL_ORDERS,
         metavar="ORDER",
     )
+    unseen_legs: Legs = option(
+        "--unseen-legs",
+        "Source",
+        "Where the source shows no legs, as in a half-length photo: jeans (default; and shoes, the"
+        " demo's), or guess (the network's, from what is seen).",
+        default="jeans",
+        choices=LEGS,
+    )
     garments: tuple[Garment, ...] = option(
         "--garment --garment-parts",
         "Garment transfer",
@@ -165,7 +176,11 @@ class KeepOptions(SourceOptions):
 class AdaptOptions(SourceOptions):
     """Whom weights are to learn, and which weights."""
 
-    SECTIONS: ClassVar = ("Source", "Raw pictures", "Garment transfer", "Learning", "Output")
+    SECTIONS: ClassVar = ("Source", "Raw pictures", "Learning", "Output")
+
+    # what is learned is the person; clothes of others are laid over whoever that is
+    garments: tuple[Garment, ...] = field(default=(), init=False)
+    unseen_legs: Legs = field(default="guess", init=False)
 
     weights: Path | None = option(
         "--weights",
@@ -193,8 +208,6 @@ class AdaptOptions(SourceOptions):
         super().__post_init__()
         if self.device is not None:
             check_device(self.device)
-        if self.garments:
-            raise InputError("weights learn a person, and no garments; give those to `mt run`")
         if self.steps is not None and self.steps < 1:
             raise InputError(f"steps is {self.steps}; it must be at least 1")
 
