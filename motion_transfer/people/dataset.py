@@ -65,7 +65,7 @@ class PeopleStream:
         self._held_out = split == "held-out"
         self._noise, self._noisy_share = noise, noisy_share
         self._framing: Framing | None = framing
-        self._model = load_body_model()
+        self.model = load_body_model()
 
     def person(self, number: int) -> Person | FreePerson:
         """Sample who has that number."""
@@ -83,7 +83,7 @@ class PeopleStream:
     def dress(self, number: int) -> DressedPerson:
         """Build the geometry of that person."""
         with one_thread():
-            return DressedPerson(self.person(number), self._model)
+            return DressedPerson(self.person(number), self.model)
 
     def take(self, dressed: DressedPerson, shot: Shot) -> PersonPhoto:
         """Take a photo of a dressed person."""

@@ -28,6 +28,8 @@ from motion_transfer.render.source_pictures import find_person, read_pictures
 from nhrr_core import load_uv_tables
 from nhrr_core.parts import ALL_PARTS, PART_GROUPS
 
+JEANS = Path(str(files("motion_transfer.render"))) / "jeans"
+
 LEG_PARTS = (*PART_GROUPS["upper-legs"], *PART_GROUPS["lower-legs"])
 SMALLEST_LEG_SHARE = 0.015
 """Of the legs' texels: from less, which is a hand's breadth of trousers, the network does not tell
@@ -79,7 +81,7 @@ def read_sources(
 
 
 def clothe_legs(sources: Sequence[Source], legs: Legs) -> list[Source]:
-    """Lay the demo's jeans and shoes over legs that a person does not show, if that is asked for.
+    """Lay jeans and shoes over legs that a person does not show, if that is asked for.
 
     FeatureNet's own guess is the mean of all that could be there, which nobody wears.
 
@@ -96,16 +98,19 @@ def clothe_legs(sources: Sequence[Source], legs: Legs) -> list[Source]:
         f"{first.photo.path} shows no legs: they wear jeans; --garment takes clothes from another"
         " photo, --unseen-legs guess leaves them to the network"
     )
-    dressed = [dress(undress(source, jeans.parts), [jeans]) for source in sources]
+    dressed = [dress(undress(source, jeans[0].parts), jeans) for source in sources]
     return [replace(source, notes=(*source.notes, note)) for source in dressed]
 
 
 @cache
-def _read_jeans() -> SourcePicture:
-    demo = Path(str(files("motion_transfer.demo")))
-    photo = read_photo(demo / "source.png")
-    iuv = read_person(photo, demo / "source_IUV.png", "largest", None, "demo")
-    return SourcePicture(photo, iuv, parts=(*LEG_PARTS, *PART_GROUPS["feet"]))
+def _read_jeans() -> list[SourcePicture]:
+    """Legs of a synthetic person, front and back; `tools/build_jeans.py` made them."""
+    found = []
+    for name in ("back", "front"):  # the front wins where both show a flank
+        photo = read_photo(JEANS / f"{name}.png")
+        iuv = read_person(photo, JEANS / f"{name}_IUV.png", "largest", None, "jeans")
+        found.append(SourcePicture(photo, iuv, parts=(*LEG_PARTS, *PART_GROUPS["feet"])))
+    return found
 
 
 def check_visible(source: Source, name: str) -> None:

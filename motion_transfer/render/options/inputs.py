@@ -106,8 +106,8 @@ class SourceOptions(EstimatorOptions):
     unseen_legs: Legs = option(
         "--unseen-legs",
         "Source",
-        "Where the source shows no legs, as in a half-length photo: jeans (default; and shoes, the"
-        " demo's), or guess (the network's, from what is seen).",
+        "Where the source shows no legs, as in a half-length photo: jeans (default; with shoes), or"
+        " guess (what the network makes of the rest).",
         default="jeans",
         choices=LEGS,
     )
