@@ -26,7 +26,11 @@ JEANS = Path(__file__).parents[1] / "motion_transfer" / "render" / "jeans"
 SIZE = (640, 1024)
 LEGS = [part for group in ("upper-legs", "lower-legs", "feet") for part in PART_GROUPS[group]]
 ROOM_PX = 8
-EVEN = Light(lamps=(Lamp(0.3, 0.5, (0.35,) * 3),), sky=(0.7,) * 3, ground=(0.55,) * 3)
+EVEN = Light(
+    lamps=(Lamp(azimuth=0.3, elevation=0.5, colour=(0.35, 0.35, 0.35)),),
+    sky=(0.7, 0.7, 0.7),
+    ground=(0.55, 0.55, 0.55),
+)
 TURNS = {"front": 0.0, "back": math.pi}
 
 

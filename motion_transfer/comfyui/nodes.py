@@ -26,6 +26,7 @@ from motion_transfer.estimate.opening import landmark_estimators
 from motion_transfer.events import FramesDone, Stage
 from motion_transfer.media.iuv.formats import MISSING
 from motion_transfer.render.memory import EncodedSource, MotionTransfer
+from motion_transfer.render.options import LEGS, Legs
 
 CATEGORY = "motion transfer"
 DRAFT_WEIGHTS = f"{DRAFT} (a draft without a network)"
@@ -238,10 +239,13 @@ class EncodeSource:
             "required": {
                 "source": _socket("MT_SOURCE", "Of Load Source."),
                 "weights": _choice(weights, where),
-            }
+            },
+            "optional": {"unseen_legs": _choice(LEGS, "What legs wear that the photo hides.")},
         }
 
-    def encode(self, source: Photograph, weights: str) -> tuple[Encoded]:
+    def encode(
+        self, source: Photograph, weights: str, unseen_legs: Legs = "jeans"
+    ) -> tuple[Encoded]:
         draft = weights == DRAFT_WEIGHTS
         model = MotionTransfer(
             None if draft else host.find_listed_weights(weights),
@@ -251,6 +255,7 @@ class EncodeSource:
             source.photo,
             source.iuv,
             person=source.person,
+            unseen_legs=unseen_legs,
             estimator=source.estimator,
             listener=host.Progress(),
         )
