@@ -45,7 +45,8 @@ def _tell(facts: dict[str, Any], as_json: bool) -> None:
 
 def _layout(facts: dict[str, Any], indent: str = "") -> str:
     """Lay out nested facts as aligned lines."""
-    width = max((len(str(key)) for key in facts), default=0)
+    flat = [str(key) for key, value in facts.items() if not isinstance(value, dict)]
+    width = max(map(len, flat), default=0)
     lines = []
     for key, value in facts.items():
         if isinstance(value, dict):
@@ -76,14 +77,15 @@ def inspect(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Say what PATH holds: IUV (order, size, parts, gaps, people), photo, weights, kept source; or
-    what made it, if it is an output of this program.
+    """Say what PATH holds: a photo or a clip (size, length, who is in it), IUV (order, size, parts,
+    gaps, people), weights, a kept source; or what made it, if it is an output of this program.
 
     Of several photos of one person (or with --coverage also of one, of a folder or a video): how
     much of the body they show, which of them, how well, and which photo would help most.
 
     \b
-    mt inspect dance_iuv/
+    mt inspect me.jpg
+    mt inspect dance.mp4
     mt inspect front.jpg back.jpg --coverage coverage.png
     """
     if len(paths) == 1 and coverage is None:

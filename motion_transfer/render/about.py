@@ -24,6 +24,7 @@ from motion_transfer.estimate.iuv.weights import SHIPPED as IUV_NETWORK
 from motion_transfer.estimate.iuv.weights import has_shipped
 from motion_transfer.estimate.models import MODEL_FILES, is_there, models_folder
 from motion_transfer.extras import install_command, missing_packages
+from motion_transfer.media.driver_kind import tell_kind
 from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import (
     CHANNEL_ORDERS,
@@ -32,12 +33,10 @@ from motion_transfer.media.iuv.formats import (
     iuv_suffixes,
 )
 from motion_transfer.media.iuv.opening import open_reader, open_stream
-from motion_transfer.media.iuv.stream import IuvStream
 from motion_transfer.media.output.marks import Mark
 from motion_transfer.media.output.segments import read_mark
-from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES, open_pictures
-from motion_transfer.media.pictures.photo import read_photo
-from motion_transfer.media.pictures.stream import PictureStream
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES, VIDEO_SUFFIXES
+from motion_transfer.render.about_pictures import describe_clip, describe_length, describe_photo
 from motion_transfer.render.options import is_kept
 from motion_transfer.render.provenance import parse_record
 from motion_transfer.version import __version__, holders_of, package_version
@@ -150,17 +149,22 @@ def describe_path(path: Path, order: str | None = None) -> Facts:
     if suffix == ".safetensors":
         return _describe_weights(path)
     if path.is_dir() or find_iuv_format(path).always_iuv or suffix in VIDEO_SUFFIXES:
-        return _describe_iuv(path, order)
+        # who names an order says that it is IUV
+        is_iuv = order is not None or tell_kind(path) == "iuv"
+        return _describe_iuv(path, order) if is_iuv else describe_clip(path)
     may_be_iuv = suffix in iuv_suffixes()
     if suffix in PHOTO_SUFFIXES and not may_be_iuv:
-        return _describe_photo(path)
+        return describe_photo(path)
     try:  # a picture that may be either, or an ending that no table knows
         return _describe_iuv(path, order)
     except InputError as error:
         try:
-            return _describe_photo(path) | ({"not IUV": str(error)} if may_be_iuv else {})
+            told = describe_photo(path)
         except InputError as no_photo:
             raise (no_photo if may_be_iuv else error) from None
+        # of a picture that shows somebody nobody asks why it is no IUV
+        shows_people = any(isinstance(fact, dict) for fact in told.values())
+        return told | ({"not IUV": str(error)} if may_be_iuv and not shows_people else {})
 
 
 def _describe_output(path: Path, mark: Mark) -> Facts:
@@ -210,33 +214,6 @@ def _describe_kept(path: Path) -> Facts:
     }
 
 
-def _describe_photo(path: Path) -> Facts:
-    photo = read_photo(path, "picture")
-    height, width = photo.rgb.shape[:2]
-    facts: Facts = {
-        "what": "picture" + (", turned upright as its EXIF says" if photo.turned else ""),
-        "size": f"{width} x {height}",
-        "alpha": "no" if photo.alpha is None else "yes",
-    }
-    if photo.profile:
-        facts["colours"] = f"converted from {photo.profile} to sRGB"
-    if photo.notes:
-        facts["note"] = "; ".join(photo.notes)
-    if path.suffix.lower() in PHOTO_SUFFIXES and (clip := open_pictures(path)).frame_count > 1:
-        facts |= _describe_length(clip)
-    return facts
-
-
-def _describe_length(stream: IuvStream | PictureStream) -> Facts:
-    facts: Facts = {"frames": stream.frame_count}
-    if stream.frame_rate:
-        seconds = float(stream.frame_count / stream.frame_rate)
-        facts["frame rate"] = f"{stream.frame_rate} ({seconds:.2f} s)"
-    if stream.notes:
-        facts["note"] = "; ".join(stream.notes)
-    return facts
-
-
 def _describe_iuv(path: Path, order: str | None) -> Facts:
     # missing numbers are among what is told, and no reason to tell nothing
     stream = open_stream(path, missing="hold")
@@ -252,7 +229,7 @@ def _describe_iuv(path: Path, order: str | None) -> Facts:
         "what": stream.kind,
         "channel order": ORDER_WORDS[reader.order],
         "size": f"{reader.width} x {reader.height}",
-        **_describe_length(stream),
+        **describe_length(stream),
     }
     if warning := blends.warn("it"):
         facts["warning"] = warning

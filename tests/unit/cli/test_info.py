@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from estimate_stubs import GREEN, RED, RectangleEstimator, scene
 from PIL import Image
 
 from motion_transfer import __version__
+from motion_transfer.drawing.person import Box
 from nhrr_core import PART_NAMES
 
 
@@ -97,6 +99,73 @@ def test_inspecting_a_photo(studio, mt, name: str) -> None:
     told = facts(mt, "inspect", studio.folder / name)
     assert (told["what"], told["size"], told["alpha"]) == ("picture", "30 x 20", "no")
     assert ("not IUV" in told) == name.endswith("png")
+
+
+def test_inspecting_a_photo_tells_who_is_in_it(studio, mt) -> None:
+    left, right = studio.iuv(parts=(2, 23, 24)), studio.iuv()
+    wide = np.zeros((96, 160, 3), np.uint8)
+    wide[:, :64], wide[:, 80:144] = left, right
+    studio.image("two_IUV.png", wide)
+    told = facts(mt, "inspect", studio.image("two.png", studio.dress(wide)))
+    people = told["people by two_IUV.png, from the left"]
+    assert list(people) == ["0", "1"]
+    assert people["0"].endswith(
+        "no hands, feet, upper-legs, lower-legs, upper-arms, lower-arms in sight"
+    )
+    assert people["1"].endswith("all parts in sight")
+    assert "not IUV" not in told
+
+
+@pytest.fixture
+def rectangles(monkeypatch) -> None:
+    """Whoever looks for people sees coloured rectangles."""
+    monkeypatch.setattr(
+        "motion_transfer.render.about_pictures.open_estimator",
+        lambda *_, **__: RectangleEstimator(),
+    )
+
+
+def clip(studio, name: str) -> Path:
+    """Two frames of nobody, then two people; the one to the right is larger."""
+    empty = scene()
+    two = scene((RED, Box(40, 5, 70, 55)), (GREEN, Box(4, 20, 20, 50)))
+    frames = np.stack([empty, empty, two, two])
+    if name.endswith(".mkv"):
+        return studio.video(frames, name=name)
+    for index, frame in enumerate(frames):
+        studio.image(f"{name}/{index}.png", frame)
+    return studio.folder / name
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("dance.mkv", "video of pictures"), ("dance", "folder of pictures")]
+)
+def test_inspecting_a_clip(studio, mt, rectangles, name: str, kind: str) -> None:
+    told = facts(mt, "inspect", clip(studio, name))
+    assert (told["what"], told["size"], told["frames"]) == (kind, "80 x 60", 4)
+    assert ("frame rate" in told) == name.endswith(".mkv")
+    people = told["people in frame 2, from the left"]
+    assert people["0"].startswith("30 px high, at 4,20,20,50; no torso, feet")
+    assert people["1"].startswith("50 px high, at 40,5,70,55; ")
+
+
+def test_inspecting_a_clip_of_nobody(studio, mt, rectangles) -> None:
+    told = facts(mt, "inspect", studio.video(np.stack([scene()] * 3), name="empty.mkv"))
+    assert told["people"] == "nobody found in the first 3 frames"
+
+
+def test_inspecting_a_clip_without_the_models(studio, mt, monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv("MT_CACHE_DIR", str(tmp_path / "none"))
+    told = facts(mt, "inspect", clip(studio, "dance.mkv"))
+    assert told["frames"] == 4
+    assert told["people"].startswith("not looked for: ") and "mt models fetch" in told["people"]
+
+
+def test_a_clip_that_was_iuv_before_a_lossy_codec_is_still_refused(studio, mt) -> None:
+    path = studio.video(4, name="lossy.mp4", codec="libx264", pixels="yuv420p")
+    result = mt("inspect", path)
+    assert (result.code, result.out) == (2, "")
+    assert "destroys part indices" in result.err
 
 
 def test_inspecting_weights(mt, checkpoint: Path) -> None:
