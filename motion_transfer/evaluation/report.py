@@ -362,7 +362,7 @@ def scores_csv(
     for entry in scored:
         for method, scores in zip(methods, entry.scores, strict=True):
             values = [scores[name] for name in names]
-            cells = ["" if math.isnan(value) else repr(value) for value in values]
+            cells = ["" if math.isnan(value) else repr(float(value)) for value in values]
             writer.writerow([entry.pair.source.name, entry.pair.target.name, method, *cells])
     return text.getvalue()
 

@@ -25,13 +25,35 @@ def test_systems_that_do_not_tell_are_taken_whole(
 
 
 @pytest.mark.parametrize(
-    ("system", "machine", "sums"),
-    [("darwin", "arm64", True), ("darwin", "x86_64", False), ("win32", "AMD64", False)],
+    ("system", "machine", "fast"),
+    [
+        ("darwin", "arm64", True),
+        ("darwin", "x86_64", True),
+        ("win32", "AMD64", True),
+        ("win32", "ARM64", False),
+    ],
 )
 def test_eight_bits_where_nothing_lists_what_cpus_can(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, system: str, machine: str, sums: bool
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, system: str, machine: str, fast: bool
 ) -> None:
     monkeypatch.setattr(cores, "CPU_FACTS", tmp_path / "absent")
     monkeypatch.setattr("sys.platform", system)
     monkeypatch.setattr("platform.machine", lambda: machine)
-    assert cores.sums_bytes.__wrapped__() is sums
+    assert cores.multiplies_bytes.__wrapped__() is fast
+
+
+@pytest.mark.parametrize(
+    ("flags", "fast"),
+    [
+        ("flags\t: sse4_2 avx avx2 fma", True),
+        ("flags\t: sse4_2 avx", False),
+        ("Features\t: fp asimd asimddp", True),
+        ("Features\t: fp asimd", False),
+    ],
+)
+def test_eight_bits_where_the_cpu_is_fast_in_them(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flags: str, fast: bool
+) -> None:
+    (tmp_path / "cpuinfo").write_text(flags)
+    monkeypatch.setattr(cores, "CPU_FACTS", tmp_path / "cpuinfo")
+    assert cores.multiplies_bytes.__wrapped__() is fast

@@ -11,7 +11,7 @@ import numpy as np
 import onnx
 import openvino
 
-from motion_transfer.cores import core_count, sums_bytes
+from motion_transfer.cores import core_count, multiplies_bytes
 from motion_transfer.drawing.engines import Execution
 from motion_transfer.drawing.engines.graph_engine import GraphEngine
 
@@ -21,7 +21,7 @@ EXACT = "f32"
 def fast_precisions(_device: str) -> list[str]:
     """List the precisions that this CPU is fast in."""
     told = open_core().get_property("CPU", "OPTIMIZATION_CAPABILITIES")
-    able = {"int8": "INT8" in told and sums_bytes(), "bf16": "BF16" in told}
+    able = {"int8": "INT8" in told and multiplies_bytes(), "bf16": "BF16" in told}
     return [*(name for name, can in able.items() if can), EXACT]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 
-from motion_transfer.cores import sums_bytes
+from motion_transfer.cores import multiplies_bytes
 from motion_transfer.drawing.engines import (
     ENGINES,
     Execution,
@@ -272,7 +272,7 @@ def test_eight_bits_are_taken_where_the_ranges_are_known(weights: Path, calibrat
     assert choose_execution(wish, inspect_checkpoint(weights)).precision in ("bf16", "f32")
     fastest = fast_precisions("cpu")[0]
     assert choose_execution(wish, inspect_checkpoint(calibrated)).precision == fastest
-    assert (fastest == "int8") == sums_bytes()
+    assert (fastest == "int8") == multiplies_bytes()
     wish = Wish(engine="onnx")  # which is not faster in them
     assert choose_execution(wish, inspect_checkpoint(calibrated)).precision == "f32"
 
