@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
@@ -22,19 +24,28 @@ Frame = UInt8[np.ndarray, "H W 3"]
 
 
 def make_background(
-    background: str, size: tuple[int, int], source: Source, *, in_place: bool
+    background: str,
+    size: tuple[int, int],
+    source: Source,
+    *,
+    in_place: bool,
+    redressed: Collection[int] = (),
 ) -> Frame:
     """Make a background of (height, width): one colour, or the source's photo.
 
     The photo covers the frame, centred, and loses its person, whose place is filled from around;
-    with `in_place` (the driver is the source's own IUV) it stays as it is.
+    with `in_place` (the driver is the source's own IUV) it stays as it is, but for the clothes of
+    the parts that are `redressed`: wider than the new ones, they would stand out behind them.
     """
     colour = parse_colour(background)
     if colour is not None:
         return np.full((*size, 3), colour, np.uint8)
     photo = source.photo.rgb
-    if not in_place:
-        photo = remove_person(photo, source.iuv, source.alpha)
+    if not in_place or redressed:
+        area = person_area(source.iuv, source.alpha)
+        if in_place:
+            area &= np.isin(_nearest_part(source.iuv), sorted(redressed))
+        photo = fill_from_around(photo, area)
     return fit_picture(photo, size, "cover")
 
 
@@ -71,15 +82,6 @@ def blur_picture(picture: Frame, percent: float) -> Frame:
     return cv2.GaussianBlur(picture, (0, 0), deviation) if deviation > 0 else picture
 
 
-def remove_person(
-    photo: Frame,
-    iuv: UInt8[np.ndarray, "H W 3"],
-    alpha: UInt8[np.ndarray, "H W"] | None = None,
-) -> Frame:
-    """Fill a photo's person from around; alpha knows hair and clothes, too."""
-    return fill_from_around(photo, person_area(iuv, alpha))
-
-
 def person_area(
     iuv: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"] | None = None
 ) -> UInt8[np.ndarray, "H W"]:
@@ -98,6 +100,18 @@ def person_area(
     grown = cv2.dilate(small, disc(max(2, height * growth) * scale))
     whole = cv2.resize(grown, mask.shape[::-1], interpolation=cv2.INTER_LINEAR)
     return mask | (whole > 0).astype(np.uint8)
+
+
+def _nearest_part(iuv: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
+    """Tell of every pixel which part of the person is the nearest."""
+    part = np.ascontiguousarray(iuv[..., 0])
+    outside = (part == 0).astype(np.uint8)
+    _, nearest = cv2.distanceTransformWithLabels(
+        outside, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    part_of = np.zeros(int(nearest.max()) + 1, np.uint8)
+    part_of[nearest[part > 0]] = part[part > 0]
+    return part_of[nearest]
 
 
 def fill_from_around(picture: Frame, hole: UInt8[np.ndarray, "H W"]) -> Frame:

@@ -25,7 +25,7 @@ from motion_transfer.weights.checkpoint import RANGES, copy_with_notes, read_che
 from motion_transfer.weights.checkpoint import inspect_checkpoint as inspect
 
 COARSE = 2.5
-"""Levels that 8 bits may cost this network, on average: it is 2.1 at most, and 18 with half the ranges."""
+"""Levels that 8 bits may cost this network, on average: it is 2.1, and 18 with half the ranges."""
 
 NETWORKS = {"encoder", "sampler", "painter-f32", "painter-int8"}
 

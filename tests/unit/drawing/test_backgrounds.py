@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,11 @@ from motion_transfer.drawing.backgrounds import (
     blur_picture,
     fill_from_around,
     fit_picture,
+    make_background,
     person_area,
 )
+from motion_transfer.drawing.source import Source
+from motion_transfer.media.pictures.photo import Photo
 
 WIDE = np.zeros((40, 80, 3), np.uint8)
 WIDE[:, :20], WIDE[:, 20:60], WIDE[:, 60:] = (250, 0, 0), (0, 250, 0), (0, 0, 250)
@@ -91,3 +96,32 @@ def test_nobody_leaves_no_area(studio) -> None:
     area = person_area(iuv)
     assert area[iuv[..., 0] > 0].all()
     assert area.sum() > (iuv[..., 0] > 0).sum() * 1.1  # with room for hair and clothes
+
+
+@pytest.fixture
+def dressed_source() -> Source:
+    """A head with long hair, and wide blue trousers, before a grey wall; IUV of the bare body."""
+    rgb = np.full((120, 80, 3), 150, np.uint8)
+    rgb[11:40, 31:49] = (90, 50, 20)  # hair
+    rgb[50:115, 29:51] = (0, 0, 250)
+    iuv = np.zeros_like(rgb)
+    iuv[14:38, 34:46, 0], iuv[52:112, 32:48, 0] = 23, 9
+    photo = Photo(Path("me.png"), rgb, None, turned=False)
+    blank = np.zeros((3, 8, 8), np.float32)
+    return Source(photo, iuv, None, blank, blank[:1])
+
+
+def test_in_place_a_photo_stays_as_it_is(dressed_source: Source) -> None:
+    made = make_background("photo", (120, 80), dressed_source, in_place=True)
+    np.testing.assert_array_equal(made, dressed_source.photo.rgb)
+
+
+def test_in_place_old_clothes_go_and_the_rest_stays(dressed_source: Source) -> None:
+    made = make_background("photo", (120, 80), dressed_source, in_place=True, redressed=[9, 10])
+    np.testing.assert_array_equal(made[:40], dressed_source.photo.rgb[:40])
+    assert np.abs(made[50:115].astype(int) - 150).max() <= 2
+
+
+def test_elsewhere_the_whole_person_goes(dressed_source: Source) -> None:
+    made = make_background("photo", (120, 80), dressed_source, in_place=False, redressed=[9])
+    assert np.abs(made.astype(int) - 150).max() <= 2
