@@ -6,10 +6,11 @@ from collections.abc import Collection
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float32, UInt8
 
 from motion_transfer.drawing.person import disc, occupancy
-from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.source import Source, untouched_texels
+from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
 from motion_transfer.option import parse_colour
 
 PERSON_GROWTH = 0.05  # of the person's height: hair and clothes reach beyond the IUV by about that
@@ -42,10 +43,12 @@ def make_background(
         return np.full((*size, 3), colour, np.uint8)
     photo = source.photo.rgb
     if not in_place or redressed:
-        area = person_area(source.iuv, source.alpha)
+        # nothing is filled with a person's colours, whose other parts may stay
+        emptied = fill_from_around(photo, person_area(source.iuv, source.alpha))
         if in_place:
-            area &= np.isin(_nearest_part(source.iuv), sorted(redressed))
-        photo = fill_from_around(photo, area)
+            worn = _is_nearest_to(source.iuv, ~untouched_texels(tuple(sorted(redressed))))
+            emptied = np.where(worn[..., None], emptied, photo)
+        photo = emptied
     return fit_picture(photo, size, "cover")
 
 
@@ -102,16 +105,19 @@ def person_area(
     return mask | (whole > 0).astype(np.uint8)
 
 
-def _nearest_part(iuv: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W"]:
-    """Tell of every pixel which part of the person is the nearest."""
-    part = np.ascontiguousarray(iuv[..., 0])
-    outside = (part == 0).astype(np.uint8)
+def _is_nearest_to(
+    iuv: UInt8[np.ndarray, "H W 3"], texels: Bool[np.ndarray, "T T"]
+) -> Bool[np.ndarray, "H W"]:
+    """Tell of every pixel whether the nearest one of the body shows a marked texel."""
+    body = iuv[..., 0] > 0
     _, nearest = cv2.distanceTransformWithLabels(
-        outside, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+        (~body).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    part_of = np.zeros(int(nearest.max()) + 1, np.uint8)
-    part_of[nearest[part > 0]] = part[part > 0]
-    return part_of[nearest]
+    marked = np.zeros(int(nearest.max()) + 1, bool)
+    marked[nearest[body]] = texels.ravel()[
+        texel_index(texture_coordinates(iuv[body]), texels.shape[0])
+    ]
+    return marked[nearest]
 
 
 def fill_from_around(picture: Frame, hole: UInt8[np.ndarray, "H W"]) -> Frame:

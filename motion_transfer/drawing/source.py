@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float32, UInt8
+from scipy.spatial import KDTree
 
 from motion_transfer.drawing.outline import clearance_of
 from motion_transfer.drawing.person import (
@@ -27,11 +29,16 @@ from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.media.pictures.photo import Photo
-from nhrr_core import ALL_PARTS, PART_NAMES, load_uv_tables
+from nhrr_core import ALL_PARTS, PART_GROUPS, PART_NAMES, load_uv_tables
 from nhrr_core.uv_tables import SAMPLES_PER_TEXEL
 
 SURROUNDINGS_SHARE = 0.15  # of the person's height: enough background around to know its colours
 LEAST_RATING = 0.01  # of a view, in the units of `View.rating`
+OVERLAP_METRES = 0.05
+OVERLAPS = {"lower-legs": "feet", "lower-arms": "hands", "torso": "upper-legs"}
+"""Clothes hang over what they are not worn on: hems over shoes, cuffs over hands, shirts over
+trousers. Whose clothes of the former are taken away shows so much less of the latter."""
+
 DENSE_TEXELS = 512  # a side; finer textures may miss texels, which are then as coarse as the map
 
 
@@ -119,7 +126,7 @@ def undress(source: Source, parts: Collection[int]) -> Source:
     """
     if not parts:
         return source
-    kept = ~np.isin(load_uv_tables().part, sorted(parts))
+    kept = untouched_texels(tuple(sorted(parts)))
 
     def left(values: Float32[np.ndarray, "C t t"]) -> Float32[np.ndarray, "C t t"]:
         return values * pick_nearest(kept, values.shape[-1])
@@ -135,6 +142,21 @@ def undress(source: Source, parts: Collection[int]) -> Source:
             for each in source.pictures
         ),
     )
+
+
+@cache
+def untouched_texels(taken: tuple[int, ...]) -> Bool[np.ndarray, "256 256"]:
+    """Mark the texels of other parts than those that are taken, out of reach of their clothes."""
+    tables = load_uv_tables()
+    kept = ~np.isin(tables.part, taken)
+    for above, below in OVERLAPS.items():
+        if not set(PART_GROUPS[above]) <= set(taken):
+            continue
+        covering = np.isin(tables.part, PART_GROUPS[above])
+        covered = np.isin(tables.part, PART_GROUPS[below]) & kept
+        near, _ = KDTree(tables.position[covering]).query(tables.position[covered])
+        kept[covered] = near > OVERLAP_METRES
+    return kept
 
 
 def dress(source: Source, garments: Sequence[SourcePicture]) -> Source:

@@ -65,12 +65,13 @@ def read_sources(
     """Read one source for several sizes of texture, see `read_source`; pictures are read once."""
     taken = {part for garment in options.garments for part in garment.parts}
     if options.kept is not None:
-        people = [undress(load_source(options.kept, size), taken) for size in texture_sizes]
+        people = [load_source(options.kept, size) for size in texture_sizes]
     else:
         kept = tuple(part for part in ALL_PARTS if part not in taken)
         found = read_pictures(options, listener, kept)
         pictures = [entry.picture for entry in found]
         people = [unfold_source(pictures, size, found[0].iuv_path) for size in texture_sizes]
+    people = [undress(person, taken) for person in people]
     garments = [
         _read_garment(garment, options.garments[number + 1 :], options)
         for number, garment in enumerate(options.garments)

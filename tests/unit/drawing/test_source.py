@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.source import Source, untouched_texels
 from motion_transfer.errors import InputError
 from motion_transfer.render.options import Garment, SourceOptions, parse_parts
 from motion_transfer.render.source import read_source
@@ -209,3 +209,28 @@ def test_a_garment_brings_its_own_clearance(studio) -> None:
     plain, dressed = prepare(person), prepare(person, garments=(garment(trousers, "lower-legs"),))
     assert width(dressed, SHINS) > 2 * width(plain, SHINS)
     assert width(dressed, HEAD) == width(plain, HEAD)
+
+
+@pytest.mark.parametrize(
+    ("taken", "beside", "far_off"),
+    [
+        ((11, 12, 13, 14), (5, 6), (7, 8, 9, 10)),  # hems on shoes; the trousers above stay
+        ((19, 20, 21, 22), (3, 4), (15, 16, 17, 18)),
+        ((1, 2), (7, 8, 9, 10), (23, 24)),
+    ],
+)
+def test_what_clothes_cover_of_others_goes_with_them(taken, beside, far_off) -> None:
+    tables = load_uv_tables()
+    kept = untouched_texels(taken)
+    part, place = tables.part, tables.position
+    assert not kept[np.isin(part, taken)].any()
+    assert kept[np.isin(part, far_off)].all()
+    near = np.isin(part, beside) & ~kept
+    assert 0.05 < near.sum() / np.isin(part, beside).sum() < 0.7
+    own = place[np.isin(part, taken)]
+    for texel in place[near][::97]:
+        assert np.linalg.norm(own - texel, axis=-1).min() <= 0.0501
+
+
+def test_one_leg_alone_covers_no_shoe() -> None:
+    assert untouched_texels((11, 13))[np.isin(load_uv_tables().part, (5, 6))].all()
