@@ -110,9 +110,10 @@ def _is_nearest_to(
 ) -> Bool[np.ndarray, "H W"]:
     """Tell of every pixel whether the nearest one of the body shows a marked texel."""
     body = iuv[..., 0] > 0
-    _, nearest = cv2.distanceTransformWithLabels(
+    _, labels = cv2.distanceTransformWithLabels(
         (~body).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
+    nearest = labels.astype(np.int64)
     marked = np.zeros(int(nearest.max()) + 1, bool)
     marked[nearest[body]] = texels.ravel()[
         texel_index(texture_coordinates(iuv[body]), texels.shape[0])
