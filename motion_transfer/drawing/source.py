@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
-from scipy.spatial import KDTree
 
 from motion_transfer.drawing.outline import clearance_of
 from motion_transfer.drawing.person import (
@@ -147,6 +146,8 @@ def undress(source: Source, parts: Collection[int]) -> Source:
 @cache
 def untouched_texels(taken: tuple[int, ...]) -> Bool[np.ndarray, "256 256"]:
     """Mark the texels of other parts than those that are taken, out of reach of their clothes."""
+    from scipy.spatial import KDTree  # takes a third of a second, and few runs have garments
+
     tables = load_uv_tables()
     kept = ~np.isin(tables.part, taken)
     for above, below in OVERLAPS.items():

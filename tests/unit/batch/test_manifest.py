@@ -340,7 +340,8 @@ def test_many_jobs_are_read_quickly(tmp_path: Path) -> None:
     path = write(tmp_path, json.dumps({"version": 1, "jobs": lines}), ".json")
     began = time.process_time()
     assert len(jobs_of(path)) == 10_000
-    assert time.process_time() - began < 3  # it takes 1 s of an idle core
+    # it takes 1 s of an idle core, and three times that beside another test on a slow one
+    assert time.process_time() - began < 8
 
 
 @pytest.mark.parametrize(
