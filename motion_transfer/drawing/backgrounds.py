@@ -46,7 +46,7 @@ def make_background(
         # nothing is filled with a person's colours, whose other parts may stay
         emptied = fill_from_around(photo, person_area(source.iuv, source.alpha))
         if in_place:
-            worn = _is_nearest_to(source.iuv, ~untouched_texels(tuple(sorted(redressed))))
+            worn = _is_nearest_to(source.iuv, ~untouched_texels(frozenset(redressed)))
             emptied = np.where(worn[..., None], emptied, photo)
         photo = emptied
     return fit_picture(photo, size, "cover")

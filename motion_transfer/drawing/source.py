@@ -125,7 +125,7 @@ def undress(source: Source, parts: Collection[int]) -> Source:
     """
     if not parts:
         return source
-    kept = untouched_texels(tuple(sorted(parts)))
+    kept = untouched_texels(frozenset(parts))
 
     def left(values: Float32[np.ndarray, "C t t"]) -> Float32[np.ndarray, "C t t"]:
         return values * pick_nearest(kept, values.shape[-1])
@@ -144,14 +144,14 @@ def undress(source: Source, parts: Collection[int]) -> Source:
 
 
 @cache
-def untouched_texels(taken: tuple[int, ...]) -> Bool[np.ndarray, "256 256"]:
+def untouched_texels(taken: frozenset[int]) -> Bool[np.ndarray, "256 256"]:
     """Mark the texels of other parts than those that are taken, out of reach of their clothes."""
     from scipy.spatial import KDTree  # takes a third of a second, and few runs have garments
 
     tables = load_uv_tables()
-    kept = ~np.isin(tables.part, taken)
+    kept = ~np.isin(tables.part, sorted(taken))
     for above, below in OVERLAPS.items():
-        if not set(PART_GROUPS[above]) <= set(taken):
+        if not taken.issuperset(PART_GROUPS[above]):
             continue
         covering = np.isin(tables.part, PART_GROUPS[above])
         covered = np.isin(tables.part, PART_GROUPS[below]) & kept

@@ -122,9 +122,8 @@ def make_still(options: RenderOptions, size: tuple[int, int], source: Source) ->
     if options.transparent:
         return None
     in_place = is_in_place(options, source)
-    redressed = {part for garment in options.garments for part in garment.parts}
     picture = make_background(
-        options.background, size, source, in_place=in_place, redressed=redressed
+        options.background, size, source, in_place=in_place, redressed=options.redressed
     )
     return blur_picture(picture, options.background_blur)
 

@@ -63,7 +63,7 @@ def read_sources(
     options: SourceOptions, texture_sizes: Sequence[int], listener: Listener = ignore
 ) -> list[Source]:
     """Read one source for several sizes of texture, see `read_source`; pictures are read once."""
-    taken = {part for garment in options.garments for part in garment.parts}
+    taken = options.redressed
     if options.kept is not None:
         people = [load_source(options.kept, size) for size in texture_sizes]
     else:
@@ -89,10 +89,12 @@ def clothe_legs(sources: Sequence[Source], legs: Legs) -> list[Source]:
     Args:
         sources: One person, for several sizes of texture; the first says what they show.
     """
+    if legs == "guess":
+        return list(sources)
     first = sources[0]
     on_legs = np.isin(load_uv_tables().part, LEG_PARTS)
     seen = first.visibility[0][pick_nearest(on_legs, first.visibility.shape[-1])]
-    if legs == "guess" or seen.mean() >= SMALLEST_LEG_SHARE:
+    if seen.mean() >= SMALLEST_LEG_SHARE:
         return list(sources)
     jeans = _read_jeans()
     note = (

@@ -144,6 +144,11 @@ class SourceOptions(EstimatorOptions):
         return list(zip(self.source, self.source_iuv or [None] * len(self.source), strict=True))
 
     @property
+    def redressed(self) -> frozenset[int]:
+        """The parts that garments give."""
+        return frozenset(part for garment in self.garments for part in garment.parts)
+
+    @property
     def source_words(self) -> str:
         """The sources, for messages."""
         return ", ".join(map(str, self.source))

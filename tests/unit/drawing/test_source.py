@@ -221,7 +221,7 @@ def test_a_garment_brings_its_own_clearance(studio) -> None:
 )
 def test_what_clothes_cover_of_others_goes_with_them(taken, beside, far_off) -> None:
     tables = load_uv_tables()
-    kept = untouched_texels(taken)
+    kept = untouched_texels(frozenset(taken))
     part, place = tables.part, tables.position
     assert not kept[np.isin(part, taken)].any()
     assert kept[np.isin(part, far_off)].all()
@@ -233,4 +233,4 @@ def test_what_clothes_cover_of_others_goes_with_them(taken, beside, far_off) -> 
 
 
 def test_one_leg_alone_covers_no_shoe() -> None:
-    assert untouched_texels((11, 13))[np.isin(load_uv_tables().part, (5, 6))].all()
+    assert untouched_texels(frozenset((11, 13)))[np.isin(load_uv_tables().part, (5, 6))].all()

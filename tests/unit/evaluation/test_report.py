@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy import float64
 
 from motion_transfer.errors import InputError
 from motion_transfer.evaluation.measures import Column
@@ -180,7 +179,7 @@ def test_numbers_that_json_lacks_survive(tmp_path: Path) -> None:
 
 def test_a_line_for_each_pair_and_method(tmp_path: Path) -> None:
     pair = Pair(PhotoFile("a.png", tmp_path), PhotoFile("b, c.png", tmp_path), group="a")
-    scores = [{"ssim": 0.1, "l1": math.nan}, {"ssim": math.inf, "l1": float64(1 / 3)}]
+    scores = [{"ssim": 0.1, "l1": math.nan}, {"ssim": math.inf, "l1": np.float64(1 / 3)}]
     assert scores_csv([PairScores(pair, scores, [])], COLUMNS, ["x", "y"]).splitlines() == [
         "source,target,method,ssim,l1",
         'a.png,"b, c.png",x,0.1,',

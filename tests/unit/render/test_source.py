@@ -17,7 +17,7 @@ from nhrr_core.parts import ALL_PARTS
 
 SIZE = 128
 CLOTHED = (*LEG_PARTS, 5, 6)
-WITHOUT_LEGS = tuple(part for part in (23, 24, 2, 15, 16, 19, 20, 3, 4) if part not in CLOTHED)
+WITHOUT_LEGS = (23, 24, 2, 15, 16, 19, 20, 3, 4)
 RED = {ALL_PARTS: (200, 30, 30)}
 
 
