@@ -24,8 +24,8 @@ from motion_transfer.version import __version__
 from motion_transfer.weights.checkpoint import RANGES, copy_with_notes, read_checkpoint
 from motion_transfer.weights.checkpoint import inspect_checkpoint as inspect
 
-COARSE = 2.5
-"""Levels that 8 bits may cost this network, on average: it is 2.1, and 18 with half the ranges."""
+COARSE = 2.0
+"""Levels that 8 bits may cost this network, on average: it is 1.7, and 18 with half the ranges."""
 
 NETWORKS = {"encoder", "sampler", "painter-f32", "painter-int8"}
 

@@ -12,6 +12,7 @@ from motion_transfer.drawing.export.card import FACTS_FILE, WORDS_FILE, write_ca
 from motion_transfer.drawing.export.formats import Network, run_file, run_openvino
 from motion_transfer.drawing.export.options import FORMATS, PLAIN, ExportOptions
 from motion_transfer.drawing.export.tensorrt_plan import list_sides
+from motion_transfer.drawing.graphs.networks import BYTE_LEVELS, WEIGHT_LEVELS
 from motion_transfer.drawing.graphs.whole import (
     CLEARANCE,
     DETAIL,
@@ -137,10 +138,12 @@ def list_networks(
     """Build the graphs of a checkpoint, the painter once for each precision.
 
     Args:
-        signed: Whether all 8-bit numbers are to have a sign.
+        signed: Whether all 8-bit numbers are to have a sign; weights use all 8 bits then, as those
+            who ask for it, unlike CPUs, add their products in 32.
     """
     config, tensors = read_checkpoint(weights)
     ranges = read_ranges(inspect_checkpoint(weights)) or {}
+    weight_levels = BYTE_LEVELS if signed else WEIGHT_LEVELS
     if signed:
         ranges = {name: (min(least, BELOW_ZERO), most) for name, (least, most) in ranges.items()}
     models = [
@@ -149,7 +152,8 @@ def list_networks(
     ]
     for precision in precisions:
         held = ranges if precision == "int8" else None
-        models.append(("painter", precision, build_painter(config, tensors, ranges=held)))
+        painter = build_painter(config, tensors, ranges=held, weight_levels=weight_levels)
+        models.append(("painter", precision, painter))
     return [Network(name, model, config, precision, notes) for name, precision, model in models]
 
 

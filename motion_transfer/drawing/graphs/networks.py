@@ -27,12 +27,12 @@ Projection = Callable[[Float32[np.ndarray, "I O 3 3"]], Float32[np.ndarray, "I O
 Ranges = Mapping[str, tuple[float, float]]
 """The least and the largest value that convolutions read, by the names of their weights."""
 
-LEVELS = 127
+BYTE_LEVELS = 127
 """Of an 8-bit number with a sign, either way."""
 
 WEIGHT_LEVELS = 63
-"""Likewise of a weight, which gets 7 bits: x86 without VNNI adds products of bytes by twos in 16
-bits, where 2 * 255 * 63 fits. By the perceptual distance `lite` is as near as with 127."""
+"""Likewise of a weight, where CPUs may compute: x86 without VNNI adds products of bytes by twos in
+16 bits, where 2 * 255 * 63 fits. By the perceptual distance `lite` is as near as with 127."""
 
 NORM_EPSILON = 1e-5  # of torch's norms
 
@@ -44,10 +44,17 @@ class Convolutions:
         read: What each has read so far, by the name of its weight.
     """
 
-    def __init__(self, graph: Graph, weights: Weights, ranges: Ranges | None) -> None:
+    def __init__(
+        self,
+        graph: Graph,
+        weights: Weights,
+        ranges: Ranges | None = None,
+        weight_levels: int = WEIGHT_LEVELS,
+    ) -> None:
         self._graph = graph
         self._weights = weights
         self._ranges = ranges or {}
+        self._weight_levels = weight_levels
         self.read: dict[str, str] = {}
 
     def plain(self, x: str, name: str, *, bias: bool = False, **attributes: Any) -> str:
@@ -103,7 +110,7 @@ class Convolutions:
         if least >= 0:
             scale, zero = largest / 255, np.uint8(0)
         else:
-            scale, zero = max(-least, largest) / LEVELS, np.int8(0)
+            scale, zero = max(-least, largest) / BYTE_LEVELS, np.int8(0)
         step = scale or 1.0  # of what is 0 everywhere
         codes = self._graph("QuantizeLinear", x, step, np.array(zero))
         return self._graph("DequantizeLinear", codes, step, np.array(zero))
@@ -115,7 +122,7 @@ class Convolutions:
             outputs: The kernel's axis of output channels.
         """
         others = tuple(axis for axis in range(weight.ndim) if axis != outputs)
-        scale = np.abs(weight).max(others, keepdims=True) / np.float32(WEIGHT_LEVELS)
+        scale = np.abs(weight).max(others, keepdims=True) / np.float32(self._weight_levels)
         scale[scale == 0] = 1
         codes = np.round(weight / scale).astype(np.int8)
         zeros = np.zeros(scale.size, np.int8)
@@ -133,7 +140,7 @@ def fold_norm(weights: Weights, name: str, norm: str) -> tuple[Kernel, Float32[n
 
 def append_feature_net(graph: Graph, x: str, weights: Weights) -> str:
     """Append FeatureNet, which completes a texture, see `nhrr_core.FeatureNet`."""
-    convolutions = Convolutions(graph, weights, None)
+    convolutions = Convolutions(graph, weights)
 
     def two(x: str, name: str) -> str:
         for index in (0, 3):
@@ -152,15 +159,21 @@ def append_feature_net(graph: Graph, x: str, weights: Weights) -> str:
 
 
 def append_render_net(
-    graph: Graph, features: str, weights: Weights, config: ModelConfig, ranges: Ranges | None = None
+    graph: Graph,
+    features: str,
+    weights: Weights,
+    config: ModelConfig,
+    ranges: Ranges | None = None,
+    weight_levels: int = WEIGHT_LEVELS,
 ) -> tuple[str, dict[str, str]]:
     """Append RenderNet, which draws a feature image, see `nhrr_core.RenderNet`.
 
     Args:
         ranges: Of what its convolutions read, where they are to be of 8-bit numbers.
+        weight_levels: Of their weights then, either way.
     Returns: The drawing in [-1, 1], and what each convolution reads.
     """
-    convolutions = Convolutions(graph, weights, ranges)
+    convolutions = Convolutions(graph, weights, ranges, weight_levels)
     names = (f"render_net.layers.{index}" for index in convolution_layers(config))
     width = config.render_width
 

@@ -10,6 +10,7 @@ import onnx
 
 from motion_transfer.drawing.graphs.graph import FLOAT, UINT8, Graph
 from motion_transfer.drawing.graphs.networks import (
+    WEIGHT_LEVELS,
     Ranges,
     Weights,
     append_feature_net,
@@ -150,6 +151,7 @@ def build_painter(
     weights: Weights,
     *,
     ranges: Ranges | None = None,
+    weight_levels: int = WEIGHT_LEVELS,
     looked_up: bool = False,
     taps: bool = False,
 ) -> onnx.ModelProto:
@@ -161,6 +163,7 @@ def build_painter(
 
     Args:
         ranges: Makes RenderNet's convolutions ones of 8-bit numbers.
+        weight_levels: Of their weights then, either way.
         looked_up: Whether `sampled`, 1 x H x W x D, the feature map as the pixels see it, with its
             detail, is an input in place of both; with `config.geometry` also `distance`,
             1 x 1 x H x W, that to the outline, and with `config.clearance` `unit`, 1 x 1 x 1 x 1,
@@ -180,7 +183,7 @@ def build_painter(
         _map_input(graph, config)
     iuv = _iuv_input(graph) if not looked_up or config.told_iuv else ""
     features, colours = _append_sampler(graph, config, iuv, looked_up=looked_up, starts_frames=True)
-    drawn, read = append_render_net(graph, features, weights, config, ranges)
+    drawn, read = append_render_net(graph, features, weights, config, ranges, weight_levels)
     frame = drawn if colours is None else _blend(graph, drawn, colours, config)
     levels = graph("Mul", graph("Add", frame, 1), 127.5)
     rows = graph("Clip", graph("Round", graph("Transpose", levels, perm=[0, 2, 3, 1])), 0, 255)
