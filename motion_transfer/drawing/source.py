@@ -27,6 +27,7 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.blends import BlendMeter
 from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.opening import read_single_iuv
+from motion_transfer.media.nearest import nearest_points
 from motion_transfer.media.pictures.photo import Photo
 from nhrr_core import ALL_PARTS, PART_GROUPS, PART_NAMES, load_uv_tables
 from nhrr_core.uv_tables import SAMPLES_PER_TEXEL
@@ -146,8 +147,6 @@ def undress(source: Source, parts: Collection[int]) -> Source:
 @cache
 def untouched_texels(taken: frozenset[int]) -> Bool[np.ndarray, "256 256"]:
     """Mark the texels of other parts than those that are taken, out of reach of their clothes."""
-    from scipy.spatial import KDTree  # takes a third of a second, and few runs have garments
-
     tables = load_uv_tables()
     kept = ~np.isin(tables.part, sorted(taken))
     for above, below in OVERLAPS.items():
@@ -155,8 +154,8 @@ def untouched_texels(taken: frozenset[int]) -> Bool[np.ndarray, "256 256"]:
             continue
         covering = np.isin(tables.part, PART_GROUPS[above])
         covered = np.isin(tables.part, PART_GROUPS[below]) & kept
-        near, _ = KDTree(tables.position[covering]).query(tables.position[covered])
-        kept[covered] = near > OVERLAP_METRES
+        near, _ = nearest_points(tables.position[covering], tables.position[covered])
+        kept[covered] = near[:, 0] > OVERLAP_METRES
     return kept
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import Float
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from motion_transfer.drawing.canvas import Spot
 from motion_transfer.drawing.window import Window
@@ -16,6 +16,8 @@ from motion_transfer.render.plan import DriverPlan
 
 STEP_SECONDS = 0.4
 """Half of a step's time: within it one foot at least is on the ground, and a body sways."""
+
+EDGE = cv2.BORDER_REPLICATE
 
 Path = Float[np.ndarray, "N 2"]
 """Where somebody stands in each frame, x and y in px: under the body, on the ground."""
@@ -117,9 +119,8 @@ def _follow_ground(plan: DriverPlan) -> Path:
             continue
         feet = np.array([((b.left + b.right) / 2, b.bottom) for b in boxes if b is not None])
         # where nobody is found, on the way from one place to the next
-        every = [np.interp(range(len(boxes)), known, column) for column in feet.T]
-        every[1] = maximum_filter1d(every[1], 2 * frames + 1, mode="nearest")
-        path[shot.start : shot.stop] = np.stack(
-            [gaussian_filter1d(column, frames, mode="nearest") for column in every], axis=1
-        )
+        every = np.stack([np.interp(range(len(boxes)), known, column) for column in feet.T])
+        every[1:] = cv2.dilate(every[1:], np.ones((1, 2 * frames + 1), np.uint8))
+        smooth = cv2.GaussianBlur(every, (8 * frames + 1, 1), frames, borderType=EDGE)
+        path[shot.start : shot.stop] = smooth.T
     return path

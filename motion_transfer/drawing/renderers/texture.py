@@ -12,13 +12,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-import scipy  # whose parts are imported when they are used
 from jaxtyping import Float, Float32, UInt8
 
 from motion_transfer.drawing.engines.interface import Occupied
 from motion_transfer.drawing.renderers.interface import Appearance
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import mirror_texture, pick_nearest
+from motion_transfer.media.nearest import nearest_points
 from nhrr_core import PART_COUNT, PART_GROUPS, load_uv_tables
 from nhrr_core.uv_tables import CHART_SIZE, TWIN_SIZE
 
@@ -154,13 +154,11 @@ def _fill(
     Near the border of what is seen, its pattern continues by reflection at the border; further
     away only a mean of the surroundings can be told.
     """
-    tree = scipy.spatial.KDTree(seen)
-    distance, nearest = tree.query(hidden, k=min(NEIGHBOURS, len(seen)))
-    distance, nearest = distance.reshape(len(hidden), -1), nearest.reshape(len(hidden), -1)
+    distance, nearest = nearest_points(seen, hidden, NEIGHBOURS)
     weight = 1 / np.maximum(distance, NEAR_METRES) ** 2
     weight /= weight.sum(1, keepdims=True)
     mean = np.einsum("nk,nkc->nc", weight, colours[nearest])
     border = np.einsum("nk,nkc->nc", weight, seen[nearest])
-    reflected = colours[tree.query(2 * border - hidden)[1]]
+    reflected = colours[nearest_points(seen, 2 * border - hidden)[1][:, 0]]
     blend = np.clip(2 - distance[:, :1] / REFLECTION_METRES, 0, 1)
     return (blend * reflected + (1 - blend) * mean).astype(colours.dtype)
