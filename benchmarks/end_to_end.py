@@ -31,6 +31,7 @@ from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # as the command does, before torch
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's second run is not compiled again
 
 import numpy as np
 from network import calibrated_paper

@@ -20,6 +20,7 @@ import pytest
 from PIL import Image
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch: images are tiny, cores are shared
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # commands that tests start are compiled once
 
 PREPARE_BODY = "from motion_transfer.people.figure.body import load_body_model; load_body_model()"
 
