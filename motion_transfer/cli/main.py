@@ -169,6 +169,8 @@ def main(arguments: list[str] | None = None) -> int:
     # torch's threads would spin while they wait, and take the cores from decoding and encoding;
     # read when torch is first imported, which no command has done yet
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    # NumPy's would begin with a fifth of a second of work each, and multiply nothing large here
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # what Apple's GPUs lack, the CPU computes
     os.environ.setdefault("PYTORCH_ENABLE_MPS_FALLBACK", "1")
     for stream in (sys.stdout, sys.stderr):  # Windows' old code pages lack many characters

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from jaxtyping import Float32
 
@@ -52,7 +50,7 @@ def fill_holes(graph: Graph, texture: str, shown: str, size: int, channels: int)
     shares = _area_shares(size)
     places = graph("MatMul", graph("MatMul", shares, weighted), shares.T.copy())
     rows = graph("Reshape", places, np.array([1, channels + 1, FILL_FROM**2]))
-    spread = graph("MatMul", rows, measure_surroundings())
+    spread = graph("MatMul", rows, _measure_surroundings(graph, tables))
     total, weight = graph.part(spread, 0, channels), graph.part(spread, channels, channels + 1)
     mean = graph("Div", total, graph("Max", weight, LEAST))
     mean = graph("Reshape", mean, np.array([1, channels, FILL_TO, FILL_TO]))
@@ -77,16 +75,20 @@ def _area_shares(size: int) -> Float32[np.ndarray, "P T"]:
     return shares
 
 
-@cache
-def measure_surroundings() -> Float32[np.ndarray, "N M"]:
-    """Weigh places as `nhrr_core.measure_surroundings` does."""
-    position = load_uv_tables().position
-    given, wanted = (_places(position, count).reshape(-1, 3) for count in (FILL_FROM, FILL_TO))
-    squared = np.zeros((len(given), len(wanted)), np.float32)
+def _measure_surroundings(graph: Graph, tables: UVTables) -> str:
+    """Weigh places as `nhrr_core.measure_surroundings` does, N x M.
+
+    In the graph, whose reader computes it once: as a constant it would be half of the file.
+    """
+    given, wanted = (
+        _places(tables.position, count).reshape(-1, 3) for count in (FILL_FROM, FILL_TO)
+    )
+    squared = FILL_METRES**2
     for one, other in zip(given.T, wanted.T, strict=True):
-        squared += np.square(one[:, None] - other)
-    share = FILL_METRES**2 / (squared + FILL_METRES**2)
-    return share * share * share  # a power takes ten times as long
+        apart = graph("Sub", one[:, None], other[None])
+        squared = graph("Add", graph("Mul", apart, apart), squared)
+    share = graph("Div", FILL_METRES**2, squared)
+    return graph("Mul", graph("Mul", share, share), share)  # a power takes ten times as long
 
 
 def _places(position: Float32[np.ndarray, "256 256 3"], count: int) -> Float32[np.ndarray, "P P 3"]:

@@ -98,8 +98,8 @@ def skip_what_is_slow(how: Execution) -> None:
         (Execution("onnx", "f32", "cpu"), 1),
         (Execution("torch", "bf16", "cpu"), 16),
         (Execution("openvino", "bf16", "cpu"), 16),
-        (Execution("openvino", "int8", "cpu"), 48),
-        (Execution("onnx", "int8", "cpu"), 48),
+        (Execution("openvino", "int8", "cpu"), 64),
+        (Execution("onnx", "int8", "cpu"), 64),
     ],
     ids=str,
 )
