@@ -17,7 +17,10 @@ from motion_transfer.render.options import NO_AUDIO, RenderOptions, SceneOptions
 
 SCENE = tuple(entry.name for entry in list_options(SceneOptions) if entry.name != "partners")
 MAKING = ("crf", "audio", "compare")
-SHOWN_AS_IS = ("renderer", *SCENE, "person", "driver_person", "missing", "size", *MAKING)
+SEEN = ("person", "unseen_legs")
+"""What else decides what is seen of the source, besides the files."""
+
+SHOWN_AS_IS = ("renderer", *SCENE, *SEEN, "driver_person", "missing", "size", *MAKING)
 CHANGEABLE = (*SHOWN_AS_IS, "window", "frames", "frame_rate")
 NAMING = ("name", "format")
 """What the output is called, in its folder: two words of the page that are no options."""

@@ -22,7 +22,7 @@ from motion_transfer.media.publish import check_destination, publish, work_folde
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.option import SCENES, part_of
 from motion_transfer.people import is_motion
-from motion_transfer.preview.changes import SCENE, change_options
+from motion_transfer.preview.changes import SCENE, SEEN, change_options
 from motion_transfer.preview.choices import Choice, built_in_motions, example_people
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.preview.dropped import DroppedFiles, clean_name
@@ -241,7 +241,7 @@ class Session:
                 f" --driver-person {changed.driver_person}"
             )
         source = None
-        if "person" in words and not self.is_empty:
+        if not words.keys().isdisjoint(SEEN) and not self.is_empty:
             source = self.pictures.queue.ask(lambda: self.views.source(draft_of(changed))).result()
         inputs = Inputs(cast_files(changed)) if "background" in words else None
         with self.lock:  # the driver may have been looked through meanwhile

@@ -17,7 +17,7 @@ from motion_transfer.preview.dropped import MOST_BYTES, MOST_FILE_BYTES
 from motion_transfer.preview.export import command_line
 from motion_transfer.preview.session import Session
 from motion_transfer.render.composition import read_format
-from motion_transfer.render.options import DEFAULT_RATE, SIZES, RenderOptions, parse_window
+from motion_transfer.render.options import DEFAULT_RATE, LEGS, SIZES, RenderOptions, parse_window
 from motion_transfer.render.scene import frame_size
 from nhrr_core.parts import PART_GROUPS
 
@@ -60,6 +60,7 @@ def _choices(session: Session) -> dict[str, Any]:
         "choices": {
             "renderer": list(RENDERERS),
             "person": _whom(session.source_people, options.person),
+            "unseen_legs": list(LEGS),
             "driver_person": _whom(in_driver, options.driver_person),
             "size": [each for each in SIZES if each != "background" or behind],
             "parts": list(PART_GROUPS),

@@ -47,6 +47,7 @@ UNTOUCHED = {
     "renderer": "texture",
     "background": "white",
     "person": "largest",
+    "unseen_legs": "jeans",
     "driver_person": "largest",
     "frames": [0, FRAMES],
     "frame_rate": "15",

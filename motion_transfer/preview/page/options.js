@@ -12,7 +12,11 @@ const WORDS = {
   crop: "around the person",
   even: "as the driver, even",
   background: "as the background",
+  jeans: "in jeans",
+  guess: "guessed",
 };
+
+const SELECTS = ["renderer", "person", "unseen_legs", "driver_person", "size"];
 
 const GAPS = {
   "": "as usual",
@@ -33,7 +37,7 @@ export function setUpOptions(looking) {
   // One after the other: two that overtake each other would leave the older one standing.
   let last = Promise.resolve();
   const choose = (changes) => (last = last.then(() => send(changes)));
-  for (const option of ["renderer", "person", "driver_person", "size"]) {
+  for (const option of SELECTS) {
     byId(option).addEventListener("change", (event) => choose({ [option]: event.target.value }));
   }
   setUpRange(looking, choose);
@@ -73,7 +77,7 @@ export function setOut(looking, choose) {
 function showOptions(looking) {
   const { options, choices } = looking.state;
   byId("made").disabled = !looking.isReady;
-  for (const name of ["renderer", "person", "driver_person", "size"]) {
+  for (const name of SELECTS) {
     fill(byId(name), choices[name] ?? [], options[name]);
   }
   showRange(looking);

@@ -263,6 +263,23 @@ def test_an_option_changes_the_pictures_and_their_key(options: RenderOptions, op
     assert session.key == before
 
 
+def test_legs_that_no_photo_shows_are_dressed_by_choice(
+    studio, options: RenderOptions, open_session
+) -> None:
+    half = studio.source("half", parts=(23, 24, 2, 15, 16, 19, 20, 3, 4))
+    session = open_session(replace(options, source=(half,)))
+    session.wait_for_plan()
+    wait_for(lambda: session.source is not None)
+    assert "shows no legs" in "".join(session.source.notes)
+    worn = picture(session.ask_frame(0, "result", session.key).result())
+    session.change({"unseen_legs": "guess"})
+    assert not session.source.notes
+    guessed = picture(session.ask_frame(0, "result", session.key).result())
+    away = np.abs(worn.astype(int) - guessed).max((1, 2)) > 30
+    assert away.any()
+    assert not away[: len(away) // 4].any()  # of head and chest nothing changes
+
+
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
