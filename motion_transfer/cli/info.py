@@ -27,12 +27,16 @@ def info(topic: str, as_json: bool) -> None:
     mt info
     mt info out.mp4
     """
-    from motion_transfer.render.about import describe_parts, describe_path, describe_setup
+    if topic == "all":
+        from motion_transfer.render.about_setup import describe_setup
 
-    topics = {"all": describe_setup, "parts": describe_parts}
-    if topic not in topics and not Path(topic).exists():
+        _tell(describe_setup(), as_json)
+        return
+    from motion_transfer.render.about import describe_parts, describe_path
+
+    if topic != "parts" and not Path(topic).exists():
         raise InputError(f"{topic} does not exist, and is no topic either; those are all and parts")
-    _tell(topics[topic]() if topic in topics else describe_path(Path(topic)), as_json)
+    _tell(describe_parts() if topic == "parts" else describe_path(Path(topic)), as_json)
 
 
 def _tell(facts: dict[str, Any], as_json: bool) -> None:

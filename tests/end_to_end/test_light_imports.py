@@ -56,3 +56,13 @@ def test_neither_does_keeping_a_source(studio, checkpoint: Path) -> None:
     assert not imported_by(*save)
     run = ("run", "--source", kept, "--driver", studio.driver(2), "--weights", checkpoint)
     assert not imported_by(*run, "-o", studio.folder / "out.mp4", "--engine", "openvino")
+
+
+def test_neither_does_telling_what_a_file_holds(mt, studio, checkpoint: Path) -> None:
+    output = studio.folder / "out.png"
+    run = ("run", "--source", studio.source(), "--driver", studio.driver(1), "-o", output)
+    mt(*run, "--renderer", "texture", "-q")
+    # pydantic reads what an output says of itself
+    told = {path: imported_by("inspect", path) for path in (studio.driver(1), checkpoint, output)}
+    assert told == {studio.driver(1): [], checkpoint: [], output: ["pydantic"]}
+    assert imported_by("info", output) == ["pydantic"]

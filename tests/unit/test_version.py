@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from motion_transfer.render.about import _describe_opencv
+from motion_transfer.render.about_setup import _describe_opencv
 from motion_transfer.version import holders_of, package_version
 
 

@@ -239,8 +239,8 @@ def test_info_tells_whether_they_are_there(mt, monkeypatch, tmp_path: Path) -> N
 
 
 def test_info_tells_that_the_iuv_network_is_missing(mt, monkeypatch) -> None:
-    monkeypatch.setattr("motion_transfer.render.about._describe_shipped", str)
-    monkeypatch.setattr("motion_transfer.render.about.has_shipped", lambda: False)
+    monkeypatch.setattr("motion_transfer.render.about_setup._describe_shipped", str)
+    monkeypatch.setattr("motion_transfer.render.about_setup.has_shipped", lambda: False)
     assert "iuv_network.safetensors is missing" in mt("info").out
-    monkeypatch.setattr("motion_transfer.render.about.has_shipped", lambda: True)
+    monkeypatch.setattr("motion_transfer.render.about_setup.has_shipped", lambda: True)
     assert "is missing" not in mt("info").out
