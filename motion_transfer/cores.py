@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 CPU_FACTS = Path("/proc/cpuinfo")
+VECTOR_UNITS = re.compile(r"\b(?:avx|amx|asimd|sve)\w*")
 PRODUCTS_OF_BYTES = re.compile(r"\b(?:avx2|asimddp)\b")
 
 _share: int | None = None
@@ -36,6 +37,12 @@ def multiplies_bytes() -> bool:
         return bool(PRODUCTS_OF_BYTES.search(CPU_FACTS.read_text(encoding="utf-8")))
     machine = platform.machine().lower()
     return machine in ("x86_64", "amd64") or (sys.platform == "darwin" and machine == "arm64")
+
+
+def name_processor() -> list[str]:
+    """Tell the processor's kind, and what it multiplies with: another one may round otherwise."""
+    flags = CPU_FACTS.read_text(encoding="utf-8") if CPU_FACTS.exists() else platform.processor()
+    return [platform.machine(), *sorted(set(VECTOR_UNITS.findall(flags)))]
 
 
 def take_share(count: int) -> None:

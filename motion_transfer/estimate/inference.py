@@ -15,7 +15,7 @@ import onnx
 import openvino
 
 from motion_transfer.cores import core_count
-from motion_transfer.drawing.engines.openvino_engine import compile_graph, open_core
+from motion_transfer.drawing.engines.compiling import compile_graph, open_core
 from motion_transfer.errors import InputError
 from motion_transfer.media.quiet import quiet_libraries
 
@@ -36,16 +36,21 @@ class CpuNetwork:
         self, model: Path | onnx.ModelProto, *, inner: Sequence[str] = (), at_once: int = 1
     ) -> None:
         threads = min(at_once, core_count())
-        graph = (
-            _read(model)
-            if isinstance(model, Path)
-            else open_core().read_model(model.SerializeToString())
-        )
-        if inner:
-            graph.add_outputs([_find_sum(graph, name) for name in inner])
+        content = model.read_bytes() if isinstance(model, Path) else model.SerializeToString()
+
+        def read() -> openvino.Model:
+            if not isinstance(model, Path):
+                return open_core().read_model(content)
+            graph = _read(model)
+            if inner:
+                graph.add_outputs([_find_sum(graph, name) for name in inner])
+            return graph
+
         # measured: in bfloat16 landmarks are 2 px off, some 13, and the IUV network, which would
         # take 8 instead of 13 ms, flickers more (0.23 % of pixels instead of 0.20)
-        self._compiled = compile_graph(graph, "f32", threads, threads=threads)
+        self._compiled = compile_graph(
+            content, read, "f32", threads, threads=threads, how=tuple(inner)
+        )
         self._own = threading.local()
 
     def run(self, *inputs: np.ndarray) -> list[np.ndarray]:

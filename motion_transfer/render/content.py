@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import platform
-import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motion_transfer.cores import CPU_FACTS
+from motion_transfer.cores import name_processor
 from motion_transfer.devices import name_device
 from motion_transfer.estimate.opening import estimator_facts
 from motion_transfer.media.work import digest_file, key_of
@@ -32,7 +30,6 @@ LIBRARIES = (
     *("torch", "openvino", "onnxruntime"),
     *("numpy", "opencv-contrib-python-headless", "av", "pillow", "scipy"),
 )
-VECTOR_UNITS = re.compile(r"\b(?:avx|amx|asimd|sve)\w*")
 KEYED_ELSEWHERE = {
     *("source", "source_iuv", "garments", "weights", "adapt"),  # by the files' content
     *("driver", "driver_person", "iuv_order", "missing", "window"),  # by the plan
@@ -191,5 +188,4 @@ def describe_machine(name: str) -> list[str]:
     """Tell of a device what computes: another instruction set may round otherwise."""
     if name.startswith("cuda"):
         return [name_device(name)]
-    flags = CPU_FACTS.read_text(encoding="utf-8") if CPU_FACTS.exists() else platform.processor()
-    return [platform.machine(), *sorted(set(VECTOR_UNITS.findall(flags)))]
+    return name_processor()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ import openvino
 
 from motion_transfer.cores import core_count, multiplies_bytes
 from motion_transfer.drawing.engines import Execution
+from motion_transfer.drawing.engines.compiling import compile_graph, open_core
 from motion_transfer.drawing.engines.graph_engine import GraphEngine
 
 EXACT = "f32"
@@ -36,36 +36,29 @@ class OpenVinoEngine(GraphEngine):
     def open(
         self, model: onnx.ModelProto, sizes: Mapping[str, tuple[int, ...]], *, exact: bool
     ) -> Session:
-        graph = open_core().read_model(model.SerializeToString())
-        if sizes:
-            named = {port.get_any_name() for port in graph.inputs}
-            graph.reshape({name: list(sizes[name]) for name in named & sizes.keys()})
+        content = model.SerializeToString()
+
+        def read() -> openvino.Model:
+            graph = open_core().read_model(content)
+            if sizes:
+                named = {port.get_any_name() for port in graph.inputs}
+                graph.reshape({name: list(sizes[name]) for name in named & sizes.keys()})
+            return graph
+
         # what is left of 8 bits is computed in 16 where that is fast
         half = not exact and self.execution.precision != EXACT and "bf16" in fast_precisions("cpu")
         # calls side by side are as fast as two threads in one call, and any number of workers gives
         # the same bits; what is called once is done soonest by all threads
         at_once = 1 if exact else core_count()
-        compiled = compile_graph(graph, "bf16" if half else EXACT, at_once, threads=core_count())
+        compiled = compile_graph(
+            content,
+            read,
+            "bf16" if half else EXACT,
+            at_once,
+            threads=core_count(),
+            how=sorted(sizes.items()),
+        )
         return Session(compiled, [output.name for output in model.graph.output])
-
-
-def compile_graph(
-    graph: openvino.Model, precision: str, at_once: int, *, threads: int
-) -> openvino.CompiledModel:
-    """Make a graph ready on this CPU.
-
-    Args:
-        at_once: How many calls may run at the same time; more take turns.
-        threads: Of all of them together.
-    """
-    settings = {
-        "INFERENCE_PRECISION_HINT": precision,
-        "NUM_STREAMS": at_once,
-        "INFERENCE_NUM_THREADS": threads,
-        # or several graphs, or processes, which know nothing of each other, sit on the same core
-        "ENABLE_CPU_PINNING": False,
-    }
-    return open_core().compile_model(graph, "CPU", settings)
 
 
 class Session:
@@ -96,9 +89,3 @@ class Session:
             request.set_tensor(name, openvino.Tensor(inputs[name], shared_memory=True))
         request.infer()
         return request
-
-
-@cache
-def open_core() -> openvino.Core:
-    """Open OpenVINO, once for the whole process."""
-    return openvino.Core()
