@@ -79,9 +79,10 @@ def _find(kept: Path, settings: dict[str, object]) -> openvino.CompiledModel | N
     """Load what was kept; None if it was not, or has changed since."""
     try:
         data = kept.read_bytes()
-        os.utime(kept)
     except OSError:
         return None
+    with suppress(OSError):  # a folder that may only be read
+        os.utime(kept)
     blob = data[DIGEST_BYTES:]
     if xxhash.xxh3_128_digest(blob) != data[:DIGEST_BYTES]:
         return None
