@@ -39,10 +39,11 @@ def multiplies_bytes() -> bool:
     return machine in ("x86_64", "amd64") or (sys.platform == "darwin" and machine == "arm64")
 
 
-def name_processor() -> list[str]:
+@cache
+def name_processor() -> tuple[str, ...]:
     """Tell the processor's kind, and what it multiplies with: another one may round otherwise."""
     flags = CPU_FACTS.read_text(encoding="utf-8") if CPU_FACTS.exists() else platform.processor()
-    return [platform.machine(), *sorted(set(VECTOR_UNITS.findall(flags)))]
+    return platform.machine(), *sorted(set(VECTOR_UNITS.findall(flags)))
 
 
 def take_share(count: int) -> None:

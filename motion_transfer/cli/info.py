@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, cast
 
 import click
@@ -13,6 +14,11 @@ from motion_transfer.cli.progress import choose_listener, long_wait
 from motion_transfer.cli.terminal import tell
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.formats import ChannelOrder
+
+TOPICS = {
+    "all": "motion_transfer.render.about_setup:describe_setup",
+    "parts": "motion_transfer.render.about:describe_parts",
+}
 
 
 @click.command()
@@ -27,16 +33,14 @@ def info(topic: str, as_json: bool) -> None:
     mt info
     mt info out.mp4
     """
-    if topic == "all":
-        from motion_transfer.render.about_setup import describe_setup
-
-        _tell(describe_setup(), as_json)
+    if topic in TOPICS:
+        _tell(resolve_name(TOPICS[topic])(), as_json)
         return
-    from motion_transfer.render.about import describe_parts, describe_path
+    from motion_transfer.render.about import describe_path
 
-    if topic != "parts" and not Path(topic).exists():
+    if not Path(topic).exists():
         raise InputError(f"{topic} does not exist, and is no topic either; those are all and parts")
-    _tell(describe_parts() if topic == "parts" else describe_path(Path(topic)), as_json)
+    _tell(describe_path(Path(topic)), as_json)
 
 
 def _tell(facts: dict[str, Any], as_json: bool) -> None:

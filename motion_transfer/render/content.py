@@ -188,4 +188,4 @@ def describe_machine(name: str) -> list[str]:
     """Tell of a device what computes: another instruction set may round otherwise."""
     if name.startswith("cuda"):
         return [name_device(name)]
-    return name_processor()
+    return [*name_processor()]

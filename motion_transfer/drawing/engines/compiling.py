@@ -7,7 +7,6 @@ on nothing but the graph, how it is to be run, OpenVINO and the processor. So it
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -18,7 +17,9 @@ import openvino
 import xxhash
 
 from motion_transfer.cores import name_processor
+from motion_transfer.errors import OutputError
 from motion_transfer.media.files import cache_folder
+from motion_transfer.media.publish import work_folder
 
 FOLDER, SUFFIX = "compiled", ".blob"
 
@@ -64,7 +65,7 @@ def compile_graph(
     began = time.perf_counter()
     compiled = open_core().compile_model(read(), "CPU", settings)
     if time.perf_counter() - began > WORTH_SECONDS:
-        with suppress(OSError):  # where nothing can be kept, it is compiled every time
+        with suppress(OSError, OutputError):  # where nothing can be kept, it is compiled every time
             _keep(compiled, kept)
     return compiled
 
@@ -93,20 +94,20 @@ def _find(kept: Path, settings: dict[str, object]) -> openvino.CompiledModel | N
 
 
 def _keep(compiled: openvino.CompiledModel, kept: Path) -> None:
-    """Write it under its name, whole or not at all. Raises: OSError."""
+    """Write it under its name, whole or not at all. Raises: OSError, OutputError."""
     blob = compiled.export_model().getvalue()
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=kept.parent, prefix=".", delete=False) as file:
-        file.write(xxhash.xxh3_128_digest(blob))
-        file.write(blob)
-    Path(file.name).replace(kept)
+    with work_folder(kept) as work:
+        whole = work / kept.name
+        whole.write_bytes(xxhash.xxh3_128_digest(blob) + blob)
+        whole.replace(kept)
     _make_room(kept.parent)
 
 
 def _make_room(folder: Path) -> None:
-    """Remove what was used longest ago, and was left half-written, beyond what may be kept."""
+    """Remove what was used longest ago, or left half-written, beyond what may be kept."""
     used = sorted(
-        ((file.stat(), file) for file in folder.iterdir()), key=lambda each: -each[0].st_mtime
+        ((file.stat(), file) for file in folder.rglob(f"*{SUFFIX}")),
+        key=lambda each: -each[0].st_mtime,
     )
     total = 0
     for facts, file in used:

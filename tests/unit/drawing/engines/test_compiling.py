@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -102,6 +103,19 @@ def test_a_folder_that_cannot_be_written_is_done_without(folder: Path) -> None:
     doubling = Doubling()
     assert [doubling(), doubling()] == [[0, 2, 4, 6]] * 2
     assert doubling.times == 2
+
+
+def test_a_full_disk_holds_nothing_half_written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill(path: Path, data: bytes) -> int:
+        with path.open("wb") as file:
+            file.write(data[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", fill)
+    assert Doubling()() == [0, 2, 4, 6]
+    assert not folder.exists()
 
 
 def test_what_is_soon_compiled_is_not_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
