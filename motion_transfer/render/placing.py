@@ -121,6 +121,7 @@ def _follow_ground(plan: DriverPlan) -> Path:
         # where nobody is found, on the way from one place to the next
         every = np.stack([np.interp(range(len(boxes)), known, column) for column in feet.T])
         every[1:] = cv2.dilate(every[1:], np.ones((1, 2 * frames + 1), np.uint8))
+        # as far as four times the sigma
         smooth = cv2.GaussianBlur(every, (8 * frames + 1, 1), frames, borderType=EDGE)
         path[shot.start : shot.stop] = smooth.T
     return path
