@@ -173,9 +173,9 @@ class _Handlers:
         """Write a dropped file, and give that by which it can be chosen: a number, or a word."""
         session, words = await self._session(), request.path_params
         know = {
-            "source": session.know_source,
-            "motion": session.know_motion,
-            "background": session.know_background,
+            "source": session.choices.know_photo,
+            "motion": session.choices.know_motion,
+            "background": session.choices.know_background,
         }.get(words["purpose"])
         if know is None:
             raise HTTPException(404, "files are sent as source, motion or background")

@@ -20,10 +20,10 @@ from motion_transfer.events import Event, FramesDone, Stage
 from motion_transfer.extras import missing_packages
 from motion_transfer.media.publish import check_destination, publish, work_folder
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import SCENES, part_of
+from motion_transfer.option import part_of
 from motion_transfer.people import is_motion
 from motion_transfer.preview.changes import SCENE, SEEN, change_options
-from motion_transfer.preview.choices import Choice, built_in_motions, example_people
+from motion_transfer.preview.choices import Choices
 from motion_transfer.preview.driver import FramePlans, PreviewedDriver, plan_frames
 from motion_transfer.preview.dropped import DroppedFiles, clean_name
 from motion_transfer.preview.export import manifest_text
@@ -35,14 +35,8 @@ from motion_transfer.preview.thumbs import draw_background, draw_motion, shrink
 from motion_transfer.preview.views import Views, count_people
 from motion_transfer.render.backdrop import no_pictures, open_background
 from motion_transfer.render.composition import cast_files
-from motion_transfer.render.inputs import find_source_iuv, is_clip, iuv_names
-from motion_transfer.render.options import (
-    Garment,
-    RenderOptions,
-    SourceOptions,
-    is_kept,
-    parse_parts,
-)
+from motion_transfer.render.inputs import is_clip
+from motion_transfer.render.options import RenderOptions, SourceOptions, is_kept
 from motion_transfer.render.source_pictures import first_picture
 
 
@@ -86,21 +80,12 @@ class Session:
         self.views = Views(self._hear_source)
         self.pictures = Pictures(self.views, self._note_broken)
         self.dropped = DroppedFiles(folder / "inputs")
-        self.people = [Choice(path, path.name, iuv) for path, iuv in options.sources]
-        self.numbers: list[int] = [] if is_empty else list(range(len(self.people)))
-        if is_empty:
-            self.people = []
-        self.examples = range(len(self.people), len(self.people) + len(example_people()))
-        self.people += example_people()
-        self.garments: list[int] = []
-        for garment in options.garments:
-            self.garments.append(len(self.people))
-            self.people.append(Choice(garment.photo, garment.photo.name, garment.iuv))
-        self.motions = built_in_motions()
-        self.motion = self.know_motion(options.driver)
+        self.choices = Choices(options, is_empty=is_empty)
+        self.numbers = list(range(self.choices.examples.start))
+        self.garments = list(range(self.choices.examples.stop, len(self.choices.photos)))
+        self.motion = self.choices.know_motion(options.driver)
         self.azimuth = options.azimuth or 0.0
         self._before = 0, 0.0
-        self._backgrounds = [str(path)] if (path := options.background_file) else []
         self._named = names_output
         self._inputs = Inputs()
         self._errors: dict[str, str] = {}
@@ -183,10 +168,8 @@ class Session:
         picture.
         """
         with self.lock:
-            if not 0 <= number < len(self.people):
-                raise InputError(f"there is no source {number}")
             options, leads = self.options, self.numbers[:1] == [number]
-            path = self.people[number].path
+        path = self.choices.photo(number).path
 
         def call() -> UInt8[np.ndarray, "H W 3"]:
             if (leads and is_clip(path)) or is_kept(path):
@@ -209,9 +192,7 @@ class Session:
 
     def ask_motion_picture(self, number: int) -> Future[bytes]:
         """Ask for a small picture of a motion that can be chosen."""
-        if not 0 <= number < len(self.motions):
-            raise InputError(f"there is no motion {number}")
-        path = self.motions[number].path
+        path = self.choices.motions[self.choices.motion([number])].path
         return self.pictures.ask(("motion", path), lambda: draw_motion(path), "motion")
 
     def _note_broken(self, driver: PreviewedDriver, index: int) -> None:
@@ -261,13 +242,27 @@ class Session:
                 self._errors.pop("source", None)
         self._touch()
 
+    def _check_background(self, options: RenderOptions) -> None:
+        """Raise InputError for a background that cannot be shown; know a new one."""
+        pictures = self.driver is None or self.driver.opened.pictures is not None
+        if options.background == "driver" and not pictures:
+            raise InputError(no_pictures(options.driver))
+        if (path := options.background_file) is not None:
+            open_background(path)
+            self.choices.know_background(path)
+
+    def backgrounds(self) -> list[str]:
+        """List the backgrounds that can be chosen, see `Choices.backgrounds`."""
+        pictures = self.driver is not None and self.driver.opened.pictures is not None
+        return self.choices.backgrounds(driver=pictures, photo=not self.is_empty)
+
     def _name_output(self) -> None:
         """Call the output after source and driver, where nobody has named it."""
         if self._named:
             return
         o = self.options
         folder, suffix = self.folder / "videos", o.output.suffix or ".mp4"
-        motion = Path(self.motions[self.motion].name).stem
+        motion = Path(self.choices.motions[self.motion].name).stem
         stem = Path(clean_name(f"{o.source[0].stem}_{motion}{suffix}")).stem
         asked_for = {render.options.output for render in self.renders.all}
         output, number = folder / f"{stem}{suffix}", 1
@@ -276,69 +271,22 @@ class Session:
             output = folder / f"{stem}-{number}{suffix}"
         self.options = replace(o, output=output)
 
-    # backgrounds
-
-    def _check_background(self, options: RenderOptions) -> None:
-        """Raise InputError for a background that cannot be shown; know a new one."""
-        pictures = self.driver is None or self.driver.opened.pictures is not None
-        if options.background == "driver" and not pictures:
-            raise InputError(no_pictures(options.driver))
-        if (path := options.background_file) is not None:
-            open_background(path)
-            self.know_background(path)
-
-    def know_background(self, path: Path) -> str:
-        """Take a file as a background that can be chosen; returns how it is called as an option."""
-        with self.lock:
-            if str(path) not in self._backgrounds:
-                self._backgrounds.append(str(path))
-        return str(path)
-
-    def backgrounds(self) -> list[str]:
-        """List the backgrounds that can be chosen; colours can be any."""
-        pictures = self.driver is not None and self.driver.opened.pictures is not None
-        shown = [
-            word
-            for word in SCENES
-            if (word != "driver" or pictures) and (word != "photo" or not self.is_empty)
-        ]
-        return ["white", "black", *shown, *self._backgrounds]
-
     # who is drawn
-
-    def know_source(self, path: Path) -> int:
-        """Take a dropped file as one that can be chosen; returns its number."""
-        with self.lock:
-            self.people.append(Choice(path, path.name))
-            return len(self.people) - 1
 
     def choose_sources(self, numbers: Sequence[int]) -> None:
         """Take some of the known sources, the one that leads first; IUV among them is no source.
 
         Raises: InputError for one that does not exist or shows nobody; all stays as it was then.
         """
-        with self.lock:
-            if not numbers or not all(0 <= number < len(self.people) for number in numbers):
-                raise InputError("no such source; choose one at least of those that are there")
-            known = {number: self.people[number] for number in numbers}
         if self.options.fit_body:
             raise InputError(
                 "the driver was fitted to the body of this source; start again with another"
                 " --source, or without --fit-body"
             )
-        iuv = {name for each in known.values() for name in iuv_names(each.path)}
-        known = {number: each for number, each in known.items() if each.path not in iuv}
+        known = self.choices.sources(numbers)
         paths = tuple(each.path for each in known.values())
-        named = tuple(each.iuv for each in known.values())
-        if any(named) and not all(named):
-            named = tuple(each.iuv or find_source_iuv(each.path) for each in known.values())
-            if not all(named):
-                raise InputError(
-                    "the IUV of one source was named, and there is none of another; drop that of"
-                    f" {paths[named.index(None)].name} together with it, called STEM_IUV.png, or"
-                    " start again without --source-iuv"
-                )
-        changes: dict[str, Any] = {"source": paths, "source_iuv": named if all(named) else ()}
+        iuv = tuple(each.iuv for each in known.values() if each.iuv)
+        changes: dict[str, Any] = {"source": paths, "source_iuv": iuv}
         if self.is_empty or paths[0] != self.options.source[0]:
             changes["person"] = "largest"  # another photo's people are others
         self._take(changes, list(known), self.garments)
@@ -348,17 +296,9 @@ class Session:
 
         Raises: InputError for one that does not exist or does not show them; all stays as it was.
         """
-        with self.lock:
-            if not all(0 <= number < len(self.people) for number, _ in chosen):
-                raise InputError("no such photo; choose one of those that are there")
-            photos = {number: self.people[number] for number, _ in chosen}
-        iuv = {name for each in photos.values() for name in iuv_names(each.path)}
-        chosen = [(number, parts) for number, parts in chosen if photos[number].path not in iuv]
-        garments = tuple(
-            Garment(photo=photos[number].path, parts=parse_parts(parts), iuv=photos[number].iuv)
-            for number, parts in chosen
-        )
-        self._take({"garments": garments}, self.numbers, [number for number, _ in chosen])
+        found = self.choices.garments(chosen)
+        garments = tuple(garment for _, garment in found)
+        self._take({"garments": garments}, self.numbers, [number for number, _ in found])
 
     def _take(self, changes: dict[str, Any], numbers: list[int], garments: list[int]) -> None:
         """Draw somebody else, or in other clothes. Raises: InputError; all stays as it was then."""
@@ -408,17 +348,6 @@ class Session:
 
     # whose motion it is
 
-    def know_motion(self, path: Path) -> int:
-        """Take a file, a folder or a motion's name as one to choose; returns its number."""
-        if path.suffix.lower() == ".bvh" and not str(path).startswith("people:"):
-            path = Path(f"people:{path}")
-        with self.lock:
-            for number, motion in enumerate(self.motions):
-                if motion.path == path:
-                    return number
-            self.motions.append(Choice(path, path.name))
-            return len(self.motions) - 1
-
     def choose_motion(self, numbers: Sequence[int], azimuth: float = 0.0) -> None:
         """Take a known motion, or several frames that were sent together as one.
 
@@ -429,12 +358,8 @@ class Session:
         Raises: InputError if there is none of these numbers, or it cannot be seen from there.
         """
         with self.lock:
-            if not numbers or not all(0 <= number < len(self.motions) for number in numbers):
-                raise InputError("no such motion; choose one of those that are there")
-            number = numbers[0]
-            if len(numbers) > 1:  # of one drop: they lie in a folder of their own
-                number = self.know_motion(self.motions[number].path.parent)
-            path, background = self.motions[number].path, self.options.background
+            number = self.choices.motion(numbers)
+            path, background = self.choices.motions[number].path, self.options.background
             turned = azimuth or None
             if turned and is_motion(path):  # of settings that are given twice, the last one counts
                 path, turned = Path(f"{path},azimuth={azimuth:g}"), None
@@ -469,7 +394,7 @@ class Session:
     def can_turn(self) -> bool:
         """Whether the motion can be seen from elsewhere: IUV is what one camera saw."""
         with self.lock:
-            path, driver = self.motions[self.motion].path, self.driver
+            path, driver = self.choices.motions[self.motion].path, self.driver
         if missing_packages("people"):
             return False
         return is_motion(path) or (driver is not None and driver.opened.pictures is not None)

@@ -72,14 +72,14 @@ def _choices(session: Session) -> dict[str, Any]:
 
 
 def _people(session: Session) -> dict[str, Any]:
-    options, people, source = session.options, session.people, session.source
-    names = [people[number].name for number in session.numbers]
+    options, photos, source = session.options, session.choices.photos, session.source
+    names = [photos[number].name for number in session.numbers]
     garments = zip(session.garments, options.garments, strict=True)
     return {
-        "sources": [{"number": n, "name": people[n].name} for n in session.numbers],
-        "examples": [{"number": n, "name": people[n].name} for n in session.examples],
+        "sources": [{"number": n, "name": photos[n].name} for n in session.numbers],
+        "examples": [{"number": n, "name": photos[n].name} for n in session.choices.examples],
         "garments": [
-            {"number": n, "name": people[n].name, "parts": _groups(garment.parts)}
+            {"number": n, "name": photos[n].name, "parts": _groups(garment.parts)}
             for n, garment in garments
         ],
         "source_work": session.source_work and session.source_work.told(),
@@ -93,15 +93,15 @@ def _people(session: Session) -> dict[str, Any]:
 
 
 def _motion(session: Session) -> dict[str, Any]:
-    driver, opening = session.driver, session.opening
+    driver, opening, motions = session.driver, session.opening, session.choices.motions
     return {
-        "motions": [{"number": n, "name": each.name} for n, each in enumerate(session.motions)],
+        "motions": [{"number": n, "name": each.name} for n, each in enumerate(motions)],
         "motion": session.motion,
         "azimuth": session.azimuth,
         "can_turn": session.can_turn,
         "driver": driver
         and {
-            "name": session.motions[session.motion].name,
+            "name": motions[session.motion].name,
             "frame_count": driver.opened.frame_count,
             "width": driver.opened.reader.width,
             "height": driver.opened.reader.height,

@@ -382,7 +382,7 @@ def test_another_motion_takes_the_place_of_the_first(
     session.wait_for_plan()
     session.change({"frames": "3:9", "window": "1,2,60"})
     key = session.key
-    number = session.know_motion(studio.video(9))
+    number = session.choices.know_motion(studio.video(9))
     session.choose_motion([number])
     session.wait_for_plan()
     state = describe(session)
@@ -401,7 +401,7 @@ def test_a_motion_is_seen_from_elsewhere(options, open_session, body_model) -> N
     session = open_session(replace(options, renderer="texture"))
     session.wait_for_plan()
     assert describe(session)["can_turn"] is False  # IUV is what one camera saw
-    walk = session.know_motion(Path("people:walk"))
+    walk = session.choices.know_motion(Path("people:walk"))
     for azimuth in (0.0, 90.0):
         session.choose_motion([walk], azimuth)
         session.wait_for_plan()
@@ -424,7 +424,8 @@ def test_a_clip_of_pictures_is_seen_by_a_body_that_is_fitted_to_it(
     session.choose_motion([iuv], 45.0)
     with pytest.raises(InputError, match="--azimuth fits a body to pictures"):
         session.wait_for_plan()
-    clip = session.know_motion(studio.image("clip/0.png", np.full((40, 40, 3), 90, np.uint8)))
+    raw = studio.image("clip/0.png", np.full((40, 40, 3), 90, np.uint8))
+    clip = session.choices.know_motion(raw)
     session.choose_motion([clip], 45.0)
     assert (session.options.azimuth, session.azimuth) == (45.0, 45.0)
     session.choose_motion([iuv])
@@ -437,7 +438,7 @@ def test_frames_that_are_sent_together_are_one_motion(options, open_session) -> 
     for frame in (options.driver / f"frame_{index}_IUV.png" for index in range(7)):
         with session.dropped.begin("drop", frame.name) as upload:
             upload.write(frame.read_bytes())
-            numbers.append(session.know_motion(upload.finish(motion=True)))
+            numbers.append(session.choices.know_motion(upload.finish(motion=True)))
     session.choose_motion(numbers)
     session.wait_for_plan()
     assert describe(session)["driver"]["frame_count"] == 7
@@ -447,13 +448,13 @@ def test_a_motion_that_is_none_leaves_the_others_to_choose(options, open_session
     session = open_session(options)
     session.wait_for_plan()
     first = session.motion
-    session.choose_motion([session.know_motion(studio.folder / "gone.mkv")])
+    session.choose_motion([session.choices.know_motion(studio.folder / "gone.mkv")])
     with pytest.raises(InputError, match=r"gone\.mkv does not exist"):
         session.wait_for_plan()
     session.choose_motion([first])
     session.wait_for_plan()
     assert session.error is None
-    with pytest.raises(InputError, match="no such motion"):
+    with pytest.raises(InputError, match="there is no motion 99"):
         session.choose_motion([99])
 
 
@@ -565,7 +566,7 @@ def drop(session: Session, *photos: Path) -> list[int]:
     for photo in photos:
         with session.dropped.begin("drop", photo.name) as upload:
             upload.write(photo.read_bytes())
-            numbers.append(session.know_source(upload.finish()))
+            numbers.append(session.choices.know_photo(upload.finish()))
     return numbers
 
 
@@ -598,7 +599,7 @@ def test_a_photo_of_nobody_leaves_the_source_as_it_was(studio, options, open_ses
     with pytest.raises(InputError, match="no person in it"):
         session.choose_sources([0, *numbers])
     for wrong in ([], [7], [-1]):
-        with pytest.raises(InputError, match="no such source"):
+        with pytest.raises(InputError, match=r"no source.*; choose one of those"):
             session.choose_sources(wrong)
     assert (session.options, session.key, session.error) == (options, key, None)
     assert picture(session.ask_frame(3, "result", key).result()).shape == (96, 64, 3)
