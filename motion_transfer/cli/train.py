@@ -28,14 +28,13 @@ from motion_transfer.cli.progress import CountBar
 from motion_transfer.cli.terminal import counted
 from motion_transfer.errors import InputError
 from motion_transfer.training.config import (
-    LOSSES,
-    PEOPLE,
     SECTIONS,
     check_value,
     parse_assignment,
     read_settings,
     write_toml,
 )
+from motion_transfer.training.settings import LOSSES, PEOPLE
 
 run_option = section("Run")
 loss_option = section(LOSSES)

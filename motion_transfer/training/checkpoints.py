@@ -27,7 +27,7 @@ from torch import nn
 from motion_transfer.errors import InputError, WeightsError
 from motion_transfer.media.publish import publish, work_folder
 from motion_transfer.media.structured import read_structured
-from motion_transfer.training.config import KeepingSettings
+from motion_transfer.training.settings import KeepingSettings
 from motion_transfer.weights.checkpoint import load_checkpoint, save_checkpoint
 from motion_transfer.weights.tensors import first_line, load_pickled
 from nhrr_core import NeuralReRenderer

@@ -24,10 +24,7 @@ from motion_transfer.extras import require_extra
 from motion_transfer.media.growing import write_whole
 from motion_transfer.media.publish import explain_disk_errors
 from motion_transfer.training.config import (
-    AUTO,
     GPU_RECIPE,
-    PEOPLE,
-    SpeedSettings,
     TrainConfig,
     build_config,
     read_settings,
@@ -35,6 +32,7 @@ from motion_transfer.training.config import (
 )
 from motion_transfer.training.pairs import Done, ignore_done
 from motion_transfer.training.progress import Listener
+from motion_transfer.training.settings import AUTO, PEOPLE, SpeedSettings
 from motion_transfer.training.sources import open_training_data
 from motion_transfer.training.step import load_judges
 from motion_transfer.weights import SHIPPED, find_weights

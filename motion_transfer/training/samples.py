@@ -36,9 +36,10 @@ from motion_transfer.errors import InputError
 from motion_transfer.media.pictures.photo import read_photo
 from motion_transfer.media.publish import name_beside
 from motion_transfer.option import parse_colour
-from motion_transfer.training.config import DataSettings, SpeedSettings, TrainConfig
+from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.pairs import Pair, Pairs, flat_stem
 from motion_transfer.training.pictures import Image, PersonPicture, Picture, Plane, lay_over
+from motion_transfer.training.settings import DataSettings, SpeedSettings
 from nhrr_core import shrink_texture
 from nhrr_core.config import CLEARANCE_CHANNELS, CLEARANCE_SIZE, COLOUR_CHANNELS
 from nhrr_core.parts import ALL_PARTS

@@ -22,7 +22,7 @@ from motion_transfer.people import (
     write_album,
 )
 from motion_transfer.training.clips import IUV_ENDINGS, ClipFrame, list_files, open_clip_pairs
-from motion_transfer.training.config import PEOPLE, DataSettings, TrainConfig
+from motion_transfer.training.config import TrainConfig
 from motion_transfer.training.pairs import (
     Done,
     Pair,
@@ -33,6 +33,7 @@ from motion_transfer.training.pairs import (
     open_pairs,
 )
 from motion_transfer.training.pictures import PersonPicture, PhotoFile
+from motion_transfer.training.settings import PEOPLE, DataSettings
 from motion_transfer.version import __version__, package_version
 
 NOT_PHOTOS = (*IUV_ENDINGS, "_alpha")

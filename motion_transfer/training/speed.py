@@ -12,7 +12,7 @@ import torch
 from torch import nn
 
 from motion_transfer.drawing.engines.torch_engine import choose_dtype
-from motion_transfer.training.config import Precision
+from motion_transfer.training.settings import Precision
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 LARGEST_MMAP_THRESHOLD = 1 << 30  # bytes: no tensor of a step is larger

@@ -18,7 +18,6 @@ from torch.optim import Optimizer
 
 from motion_transfer.errors import WeightsError
 from motion_transfer.estimate.models import FACE_NETWORK, find_model
-from motion_transfer.training.config import LossSettings
 from motion_transfer.training.face_networks import dlib_identity, load_dlib_face
 from motion_transfer.training.faces import (
     REMEDY,
@@ -33,6 +32,7 @@ from motion_transfer.training.feature_networks import (
     load_efficientnet_lite0,
     load_vgg19,
 )
+from motion_transfer.training.settings import LossSettings
 from nhrr_core import (
     LossWeights,
     NeuralReRenderer,

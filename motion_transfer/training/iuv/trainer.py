@@ -38,10 +38,10 @@ from motion_transfer.estimate.iuv.network import (
 )
 from motion_transfer.estimate.iuv.painting import paint_iuv
 from motion_transfer.media.publish import publish
-from motion_transfer.training.config import Precision
 from motion_transfer.training.iuv.augmentation import NOTHING, Augmentation, training_pair
 from motion_transfer.training.iuv.samples import list_samples, read_sample
 from motion_transfer.training.progress import Listener, Logged
+from motion_transfer.training.settings import Precision
 from motion_transfer.training.speed import Clock, choose_precision, keep_memory
 from motion_transfer.weights.tensors import first_line, load_pickled
 

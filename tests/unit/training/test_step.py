@@ -11,10 +11,10 @@ import torch
 from torch import Tensor, nn
 
 from motion_transfer.errors import InputError, WeightsError
-from motion_transfer.training.config import LossSettings
 from motion_transfer.training.face_networks import DlibFace, dlib_identity
 from motion_transfer.training.faces import FaceIdentity, SphereFace20, face_table
 from motion_transfer.training.feature_networks import FeatureNetwork
+from motion_transfer.training.settings import LossSettings
 from motion_transfer.training.step import (
     Arithmetic,
     Average,
