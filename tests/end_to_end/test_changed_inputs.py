@@ -89,7 +89,7 @@ def small_textures(monkeypatch) -> None:
 
 
 @pytest.fixture
-def begin(studio, monkeypatch) -> Callable[..., None]:
+def assert_stops(studio, monkeypatch) -> Callable[..., None]:
     """Start a run with a bystander, see it stop and name the file, and start it again."""
 
     def call(moment: str, changed: Path, change: Change, again: bool = True, **options) -> None:
@@ -127,61 +127,61 @@ def inputs(studio) -> None:
     ("moment", "change"),
     [("scan", replace), ("read", rewrite), ("render", replace), ("join", rewrite)],
 )
-def test_a_frame_that_is_drawn_already(studio, inputs, begin, moment: str, change) -> None:
+def test_a_frame_that_is_drawn_already(studio, inputs, assert_stops, moment: str, change) -> None:
     frame = studio.folder / "driver/frame_0_IUV.png"
     other = studio.image("other.png", studio.iuv(7, 7))
-    begin(moment, frame, partial(change, frame, other))
+    assert_stops(moment, frame, partial(change, frame, other))
 
 
 @pytest.mark.parametrize("moment", ["scan", "join"])
 @pytest.mark.parametrize("number", [FRAMES - 1, FRAMES])
-def test_frames_that_go_and_come(studio, inputs, begin, moment: str, number: int) -> None:
+def test_frames_that_go_and_come(studio, inputs, assert_stops, moment: str, number: int) -> None:
     frame = studio.folder / f"driver/frame_{number}_IUV.png"
     other = studio.image("other.png", studio.iuv(7, 7))
     change = partial(remove, frame, other) if frame.exists() else partial(replace, frame, other)
-    begin(moment, frame, change, again=False)
+    assert_stops(moment, frame, change, again=False)
 
 
 @pytest.mark.parametrize("moment", ["scan", "render"])
 @pytest.mark.parametrize("kind", ["video", "array"])
-def test_a_driver_of_one_file(studio, begin, moment: str, kind: str) -> None:
+def test_a_driver_of_one_file(studio, assert_stops, moment: str, kind: str) -> None:
     studio.source()
     write = {"video": studio.video, "array": studio.array}[kind]
     driver = write(FRAMES)
     other = write(studio.walk(FRAMES + 2)[2:], name=f"other{driver.suffix}")
-    begin(moment, driver, partial(replace, driver, other), again=False, driver=driver)
+    assert_stops(moment, driver, partial(replace, driver, other), again=False, driver=driver)
 
 
 @pytest.mark.parametrize("name", ["person.png", "person_IUV.png"])
 @pytest.mark.parametrize(
     ("moment", "change"), [("read", replace), ("render", rewrite), ("join", replace)]
 )
-def test_a_source(studio, inputs, begin, moment: str, name: str, change) -> None:
+def test_a_source(studio, inputs, assert_stops, moment: str, name: str, change) -> None:
     source = studio.source("other", colours={(2,): (1, 2, 3)}, parts=(2, 9, 10, 23, 24))
     other = source if name == "person.png" else studio.folder / "other_IUV.png"
     file = studio.folder / name
-    begin(moment, file, partial(change, file, other))
+    assert_stops(moment, file, partial(change, file, other))
 
 
 @pytest.mark.parametrize("moment", ["read", "join"])
-def test_a_source_that_goes(studio, inputs, begin, moment: str) -> None:
+def test_a_source_that_goes(studio, inputs, assert_stops, moment: str) -> None:
     file = studio.folder / "person.png"
-    begin(moment, file, partial(remove, file, file), again=False)
+    assert_stops(moment, file, partial(remove, file, file), again=False)
 
 
 @pytest.mark.parametrize("moment", ["render", "join"])
-def test_sound(studio, inputs, begin, moment: str) -> None:
+def test_sound(studio, inputs, assert_stops, moment: str) -> None:
     sound, other = tone(studio.folder / "a.wav", 440), tone(studio.folder / "b.wav", 880)
-    begin(moment, sound, partial(replace, sound, other), again=False, audio=sound)
+    assert_stops(moment, sound, partial(replace, sound, other), again=False, audio=sound)
 
 
 @pytest.mark.parametrize("moment", ["read", "render", "join"])
-def test_weights(studio, inputs, begin, moment: str, checkpoint: Path) -> None:
+def test_weights(studio, inputs, assert_stops, moment: str, checkpoint: Path) -> None:
     weights, other = studio.folder / "a.safetensors", studio.folder / "b.safetensors"
     shutil.copy(checkpoint, weights)
     other_weights(checkpoint, other)
     network._load_network.cache_clear()
-    begin(
+    assert_stops(
         *(moment, weights, partial(replace, weights, other)),
         renderer="nhrr",
         weights=weights,
@@ -224,7 +224,7 @@ def test_weights_that_changed_before_they_are_loaded_draw_nothing(
     ("moment", "kind"),
     [("estimate", "video"), ("estimate", "folder"), ("scan", "video"), ("join", "video")],
 )
-def test_a_raw_clip(studio, begin, moment: str, kind: str) -> None:
+def test_a_raw_clip(studio, assert_stops, moment: str, kind: str) -> None:
     """What is kept of a clip must not come from another one than its key says."""
     studio.source()
     dance = np.stack([scene((RED, Box(5 + 3 * i, 8, 25 + 3 * i, 52))) for i in range(8)])
@@ -236,7 +236,7 @@ def test_a_raw_clip(studio, begin, moment: str, kind: str) -> None:
             studio.image(f"dance/{number}.png", picture)
         clip, other = studio.folder / "dance", studio.image("other.png", dance[5])
     changed = clip / "0.png" if clip.is_dir() else clip
-    begin(
+    assert_stops(
         *(moment, changed, partial(replace, changed, other)),
         driver=clip,
         estimator="densepose",

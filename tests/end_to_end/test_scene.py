@@ -8,10 +8,10 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from conftest import COLOURS, TORSO
 from estimate_stubs import RED, write_red_model
 from PIL import Image
 from skimage import data
+from studio import COLOURS, TORSO
 
 from motion_transfer import Partner, render_video
 from motion_transfer.errors import InputError, MotionTransferError

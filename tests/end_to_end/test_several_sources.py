@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from decoded import decoded
 from PIL import Image
+from studio import LEGS, UPPER
 
 from motion_transfer import render_video
 from motion_transfer.drawing.renderers.texture import TextureRecipe
@@ -17,8 +18,6 @@ from motion_transfer.errors import InputError
 from motion_transfer.events import FramesDone, Notice, Stage
 from motion_transfer.render.plan import CHUNK_FRAMES
 
-LEGS = (9, 10, 13, 14, 5, 6)
-UPPER = (23, 24, 2, 15, 16, 19, 20, 3, 4)
 GREEN, PINK = (60, 150, 60), (200, 90, 150)
 FRAMES = CHUNK_FRAMES + 20
 draw = partial(render_video, renderer="texture")

@@ -13,10 +13,10 @@ from pathlib import Path
 import av
 import numpy as np
 import torch
-from conftest import Studio
 from hypothesis.strategies import SearchStrategy
 from PIL import Image, ImageCms
 from reference import densepose_dump
+from studio import Studio
 
 from fuzz import mutations
 from motion_transfer.batch.run import check_batch, read_batch

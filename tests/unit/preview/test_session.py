@@ -12,6 +12,7 @@ from threading import Event
 import numpy as np
 import pytest
 from PIL import Image
+from studio import LEGS, UPPER
 
 from motion_transfer.batch.expand import expand
 from motion_transfer.batch.manifest import read_manifest
@@ -29,7 +30,6 @@ from motion_transfer.render.options import Partner, RenderOptions
 from motion_transfer.render.run import run
 
 COUNT = 40
-LEGS = (9, 10, 13, 14, 5, 6)
 
 
 @pytest.fixture
@@ -266,7 +266,7 @@ def test_an_option_changes_the_pictures_and_their_key(options: RenderOptions, op
 def test_legs_that_no_photo_shows_are_dressed_by_choice(
     studio, options: RenderOptions, open_session
 ) -> None:
-    half = studio.source("half", parts=(23, 24, 2, 15, 16, 19, 20, 3, 4))
+    half = studio.source("half", parts=UPPER)
     session = open_session(replace(options, source=(half,)))
     session.wait_for_plan()
     wait_for(lambda: session.source is not None)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from studio import UPPER
 
 from motion_transfer.drawing.kept_source import save_source
 from motion_transfer.drawing.source import Source
@@ -17,7 +18,6 @@ from nhrr_core.parts import ALL_PARTS
 
 SIZE = 128
 CLOTHED = (*LEG_PARTS, 5, 6)
-WITHOUT_LEGS = (23, 24, 2, 15, 16, 19, 20, 3, 4)
 RED = {ALL_PARTS: (200, 30, 30)}
 
 
@@ -33,7 +33,7 @@ def colour_of(source: Source, *parts: int) -> np.ndarray:
 
 @pytest.fixture
 def half_length(studio):
-    return studio.source("half", parts=WITHOUT_LEGS, colours=RED)
+    return studio.source("half", parts=UPPER, colours=RED)
 
 
 def test_legs_that_no_photo_shows_wear_jeans_front_and_back(half_length) -> None:
@@ -65,14 +65,14 @@ def test_it_is_said_how_to_have_others(half_length) -> None:
 
 
 def test_a_bit_of_the_thighs_is_enough_to_be_left_as_it_is(studio) -> None:
-    photo = studio.source("short", parts=(*WITHOUT_LEGS, 9), colours=RED)
+    photo = studio.source("short", parts=(*UPPER, 9), colours=RED)
     source = read_source(SourceOptions(source=(photo,)), SIZE)
     assert not source.notes
     assert source.visibility[0][texels(11, 12, 13, 14)].mean() < 0.02
 
 
 def test_legs_of_a_garment_or_of_another_photo_are_worn(studio, half_length) -> None:
-    trousers = studio.source("trousers", parts=(*WITHOUT_LEGS, 9, 10, 13, 14), colours=RED)
+    trousers = studio.source("trousers", parts=(*UPPER, 9, 10, 13, 14), colours=RED)
     garment = Garment(photo=trousers, parts=LEG_PARTS)
     for options in (
         SourceOptions(source=(half_length,), garments=(garment,)),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from estimate_stubs import RED, scene, write_red_model
+from studio import LEGS, UPPER
 
 from motion_transfer.drawing.moments import MOST_MOMENTS
 from motion_transfer.drawing.person import Box
@@ -18,7 +19,6 @@ from motion_transfer.render.options import SourceOptions
 from motion_transfer.render.source import read_source
 from motion_transfer.render.source_pictures import FoundPicture, read_pictures
 
-UPPER, LOWER = (23, 24, 2, 15, 16, 19, 20, 3, 4), (9, 10, 13, 14, 5, 6)
 FRAME = (300, 260)
 
 
@@ -45,9 +45,9 @@ def refusal(*sources: Path, **more) -> str:
 def frames(studio) -> np.ndarray:
     """A clip's IUV: nobody; legs; all but the legs, elsewhere; and the legs again, smaller."""
     pieces = [
-        studio.iuv(80, 40, size=FRAME, scale=2, parts=LOWER),
+        studio.iuv(80, 40, size=FRAME, scale=2, parts=LEGS),
         studio.iuv(20, 20, size=FRAME, scale=2, parts=UPPER),
-        studio.iuv(10, 10, size=FRAME, parts=LOWER),
+        studio.iuv(10, 10, size=FRAME, parts=LEGS),
     ]
     return np.stack([np.zeros((*FRAME, 3), np.uint8), *pieces])
 
@@ -83,11 +83,11 @@ def test_each_photo_takes_the_iuv_that_is_named_for_it(studio) -> None:
     photos = [studio.source(name) for name in ("a", "b")]
     named = [
         studio.image(f"{name}.png", studio.iuv(scale=2, size=(192, 128), parts=parts))
-        for name, parts in (("first", UPPER), ("second", LOWER))
+        for name, parts in (("first", UPPER), ("second", LEGS))
     ]
     found = read(*photos, source_iuv=tuple(named))
     assert [one.iuv_path for one in found] == named
-    assert [parts_of(one) for one in found] == [set(UPPER), set(LOWER)]
+    assert [parts_of(one) for one in found] == [set(UPPER), set(LEGS)]
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -101,14 +101,14 @@ def test_there_is_one_iuv_for_each_source_or_none(studio, count: int) -> None:
 
 def test_a_folder_holds_photos_and_beside_each_its_iuv(studio) -> None:
     """The IUV is no photo; a photo that adds nothing is left out; the fullest one leads."""
-    studio.source("me/1", parts=LOWER)
+    studio.source("me/1", parts=LEGS)
     studio.source("me/2", parts=UPPER)
     studio.source("me/3", parts=UPPER, scale=1)
     (studio.folder / "me/2_IUV.png").rename(studio.folder / "me/2_iuv.png")
     (studio.folder / "me/notes.txt").write_text("no photo")
     found = read(studio.folder / "me")
     assert names_of(found) == ["2.png", "1.png"]
-    assert [parts_of(one) for one in found] == [set(UPPER), set(LOWER)]
+    assert [parts_of(one) for one in found] == [set(UPPER), set(LEGS)]
 
 
 @pytest.mark.parametrize("place", ["me_IUV.mkv", "me_iuv.mkv", "me_IUV.npz", "me_iuv", "named"])
@@ -124,7 +124,7 @@ def test_a_clip_takes_its_iuv_from_beside_it(studio, frames, film, place: str, n
     else:
         studio.driver(frames, name=place)
     found = read(clip, **more)
-    assert [parts_of(one) for one in found] == [set(UPPER), set(LOWER)]
+    assert [parts_of(one) for one in found] == [set(UPPER), set(LEGS)]
     assert [one.iuv_path for one in found] == [None, None]
 
 
@@ -200,12 +200,12 @@ def test_the_chosen_person_is_followed_through_a_clip(studio) -> None:
     large = studio.iuv(0, 20, size=FRAME, scale=2, parts=UPPER)
     frames = []
     for step in range(3):
-        small = studio.iuv(170 + 5 * step, 40, size=FRAME, parts=LOWER)
+        small = studio.iuv(170 + 5 * step, 40, size=FRAME, parts=LEGS)
         frames.append(np.where(small[..., :1] > 0, small, large))
     pictures = np.stack([studio.dress(iuv) for iuv in frames])
     clip = studio.video(pictures, name="two.mkv")
     studio.video(np.stack(frames), name="two_IUV.mkv")
-    assert {part for one in read(clip, person="1") for part in parts_of(one)} == set(LOWER)
+    assert {part for one in read(clip, person="1") for part in parts_of(one)} == set(LEGS)
     assert {part for one in read(clip) for part in parts_of(one)} == set(UPPER)
 
 
@@ -239,7 +239,7 @@ def test_all_but_the_leader_are_cut_and_show_the_same(studio, frames, film, uncu
 
 def test_alpha_is_cut_with_the_picture(studio, uncut) -> None:
     """Photos of a folder may have alpha of their own, which says where the person ends."""
-    for name, parts in (("1", LOWER), ("2", UPPER)):
+    for name, parts in (("1", LEGS), ("2", UPPER)):
         iuv = studio.iuv(60, 30, size=FRAME, scale=2, parts=parts)
         alpha = ((iuv[..., 0] > 0) * 255).astype(np.uint8)
         alpha[:, :110] = 0
