@@ -18,6 +18,12 @@ from motion_transfer.drawing.window import Window
 PART_COLOUR_STEP = 10  # 24 parts over 0..240, as DensePose draws them
 CHECKER_PX, CHECKER_LEVELS = 16, (255, 204)  # as editors show that nothing is there
 
+OUTLINE_BLUR_PX, OUTLINE_GAIN = 1.0, 2.2
+"""Of a crop that is enlarged: how far its outline is blurred, and how much steeper it is then."""
+
+SPILL = 0.1
+"""Share with which a pixel's surroundings count in its colour: all of it where it has none."""
+
 Rgba = UInt8[np.ndarray, "S S 4"]
 Picture = UInt8[np.ndarray, "H W C"]
 """An output frame: RGB, or where the background is transparent, RGBA, not multiplied by alpha."""
@@ -94,14 +100,35 @@ def _blend_rgba(over: UInt8[np.ndarray, "N 4"], under: UInt8[np.ndarray, "N 4"])
 
 def _scale(rgba: Rgba, side: int) -> Rgba:
     """Scale a crop; colours count by their coverage, as those of nobody mean nothing."""
+    if len(rgba) < side:
+        return _enlarge(rgba, side)
     if len(rgba) == side:
         return rgba
-    kind = cv2.INTER_AREA if len(rgba) > side else cv2.INTER_CUBIC
     weighted = cv2.cvtColor(rgba, cv2.COLOR_RGBA2mRGBA)
-    scaled = cv2.resize(weighted, (side, side), interpolation=kind)
-    # a cubic overshoots, and no colour is brighter than what covers
-    scaled[..., :3] = np.minimum(scaled[..., :3], scaled[..., 3:])
+    scaled = cv2.resize(weighted, (side, side), interpolation=cv2.INTER_AREA)
     return cv2.cvtColor(scaled, cv2.COLOR_mRGBA2RGBA)
+
+
+def _enlarge(rgba: Rgba, side: int) -> Rgba:
+    """Enlarge a crop. Its outline has steps of a pixel, which would be as much larger: they go.
+
+    The outline is blurred, and made as steep again as enlarging it had left it. Colours go on
+    beyond it, since that moves it a little.
+    """
+    strength = min(1.0, side / len(rgba) - 1)  # at twice the size all of it
+    weighted = cv2.cvtColor(rgba, cv2.COLOR_RGBA2mRGBA)
+    around = cv2.GaussianBlur(weighted, (0, 0), OUTLINE_BLUR_PX)
+    colours, alpha, blurred = rgba[..., :3].copy(), rgba[..., 3], around[..., 3]
+    edge = (alpha < 255) & (blurred > 0)
+    mixed = weighted[edge].astype(np.float32) + SPILL * around[edge]
+    colours[edge] = (mixed[:, :3] / mixed[:, 3:] * 255).clip(0, 255).round()
+    outline = cv2.addWeighted(blurred, strength, alpha, 1 - strength, 0)
+    levels = (np.arange(256) - 127.5) * (1 + (OUTLINE_GAIN - 1) * strength) + 127.5
+    colours, outline = (
+        cv2.resize(each, (side, side), interpolation=cv2.INTER_CUBIC)
+        for each in (colours, outline)
+    )
+    return np.dstack([colours, cv2.LUT(outline, levels.clip(0, 255).round().astype(np.uint8))])
 
 
 def show_alpha(picture: Picture) -> Frame:
