@@ -125,8 +125,7 @@ def _enlarge(rgba: Rgba, side: int) -> Rgba:
     outline = cv2.addWeighted(blurred, strength, alpha, 1 - strength, 0)
     levels = (np.arange(256) - 127.5) * (1 + (OUTLINE_GAIN - 1) * strength) + 127.5
     colours, outline = (
-        cv2.resize(each, (side, side), interpolation=cv2.INTER_CUBIC)
-        for each in (colours, outline)
+        cv2.resize(each, (side, side), interpolation=cv2.INTER_CUBIC) for each in (colours, outline)
     )
     return np.dstack([colours, cv2.LUT(outline, levels.clip(0, 255).round().astype(np.uint8))])
 

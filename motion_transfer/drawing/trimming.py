@@ -1,10 +1,10 @@
-"""Which pixels of a photo are just what its IUV says: neither background nor hair before a body."""
+"""Which pixels of a photo are just what its IUV says: neither background nor what lies beside."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float32, UInt8
 
 from motion_transfer.drawing.outline import grab_cut
 from motion_transfer.drawing.person import bounding_box, disc, occupancy
@@ -13,10 +13,12 @@ from motion_transfer.drawing.views import HEAD
 from motion_transfer.media.nearest import take_nearest
 from nhrr_core import load_uv_tables
 
+ARMS = (3, 20, 22), (4, 19, 21)  # a hand and its forearm
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
 CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
-RIM_SHARE, RIM_LEVELS = 0.08, 90  # of the head's size, the root of its area; of 255: by eye
+HEAD_RIM, HEAD_LEVELS = 0.08, 90  # of a head's size, the root of its area; of 255: by eye
+ARM_RIM, ARM_LEVELS = 0.1, 60  # likewise, of a hand's and its forearm's
 MOUTH_METRES = 0.38  # see `UVTables.position`: higher up hair grows on heads
 SOLID_ALPHA = 192  # of 255; less is mixed with the background
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
@@ -27,13 +29,13 @@ def trim(
     iuv: UInt8[np.ndarray, "H W 3"],
     alpha: UInt8[np.ndarray, "H W"] | None,
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """Leave the IUV where a photo shows just that, neither background nor hair before a body.
+    """Leave the IUV where a photo shows just that, neither background nor what lies beside.
 
     Args:
         alpha: How much of each pixel is the person; None: its colours have to tell.
     """
     trimmed = trim_outline(rgb, iuv) if alpha is None else trim_to_alpha(iuv, alpha)
-    return trim_head(rgb, trimmed)
+    return trim_arms(rgb, trim_head(rgb, trimmed))
 
 
 def trim_head(
@@ -41,23 +43,42 @@ def trim_head(
 ) -> UInt8[np.ndarray, "H W 3"]:
     """Take hair that hangs beside a jaw or a neck out of the IUV: it would be drawn on their sides.
 
-    Only the rim of what lies lower than the mouth is doubted, where its colour is far from the one
-    farther in.
+    Only what lies lower than the mouth is doubted.
     """
-    head = np.isin(iuv[..., 0], HEAD)
-    left, top, width, height = cv2.boundingRect(head.astype(np.uint8))
-    around = np.s_[max(0, top - 1) : top + height + 1, max(0, left - 1) : left + width + 1]
-    head, rgb, own = head[around], rgb[around], iuv[around]
-    depth = cv2.distanceTransform(head.astype(np.uint8), cv2.DIST_L2, 3)
-    inner = head & (depth > RIM_SHARE * np.count_nonzero(head) ** 0.5)
-    if not inner.any():
-        return iuv
-    apart = cv2.absdiff(rgb, take_nearest(rgb, ~inner)).mean(2)
-    doubted = head & ~inner & (apart > RIM_LEVELS)
-    doubted[doubted] = _heights(own[doubted]) < MOUTH_METRES
-    trimmed = iuv.copy()
-    trimmed[around][doubted] = 0
-    return trimmed
+    doubted = find_strange_rim(rgb, np.isin(iuv[..., 0], HEAD), HEAD_RIM, HEAD_LEVELS)
+    doubted[doubted] = _heights(iuv[doubted]) < MOUTH_METRES
+    return iuv * ~doubted[..., None]
+
+
+def trim_arms(
+    rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Take what hands hang before out of their IUV: trousers would be streaks on arms that rise."""
+    for parts in ARMS:
+        arm = np.isin(iuv[..., 0], parts)
+        iuv = iuv * ~find_strange_rim(rgb, arm, ARM_RIM, ARM_LEVELS)[..., None]
+    return iuv
+
+
+def find_strange_rim(
+    rgb: UInt8[np.ndarray, "H W 3"], part: Bool[np.ndarray, "H W"], width: float, levels: float
+) -> Bool[np.ndarray, "H W"]:
+    """Mark the pixels of a part's rim whose colour is far from the one farther in.
+
+    Args:
+        width: Of the rim, as a share of the part's size, the root of its area.
+        levels: How far colours are apart then, the mean of their channels, of 255.
+    """
+    strange = np.zeros(part.shape, bool)
+    left, top, wide, tall = cv2.boundingRect(part.astype(np.uint8))
+    around = np.s_[max(0, top - 1) : top + tall + 1, max(0, left - 1) : left + wide + 1]
+    part, rgb = part[around], rgb[around]
+    depth = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 3)
+    inner = part & (depth > width * np.count_nonzero(part) ** 0.5)
+    if inner.any():
+        apart = cv2.absdiff(rgb, take_nearest(rgb, ~inner)).mean(2)
+        strange[around] = part & ~inner & (apart > levels)
+    return strange
 
 
 def _heights(iuv: UInt8[np.ndarray, "N 3"]) -> Float32[np.ndarray, " N"]:

@@ -1,4 +1,4 @@
-"""Which of a photo's pixels are unfolded: not the background, and not hair before a body."""
+"""Which of a photo's pixels are unfolded: neither the background nor what lies beside a part."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from motion_transfer.drawing.source import SourcePicture, unfold_picture
-from motion_transfer.drawing.trimming import SOLID_ALPHA, trim_head, trim_outline, trim_to_alpha
+from motion_transfer.drawing.trimming import (
+    SOLID_ALPHA,
+    trim_arms,
+    trim_head,
+    trim_outline,
+    trim_to_alpha,
+)
 from motion_transfer.media.pictures.photo import Photo
 from nhrr_core import load_uv_tables
 
@@ -66,6 +72,22 @@ def test_the_rim_of_a_head(level: str, edge: tuple[int, int, int], goes: bool) -
     assert trimmed[24:66, 66:70].any() != goes
     assert trimmed[24:66, 24:66].all()
     assert trim_head(photo, np.zeros_like(iuv)).sum() == 0
+
+
+def test_a_hand_before_trousers_keeps_none_of_them() -> None:
+    """The IUV of an arm reaches over white trousers; those of its sleeve are its own colours."""
+    iuv = np.zeros((120, 90, 3), np.uint8)
+    iuv[10:60, 30:54, 0], iuv[60:100, 30:54, 0] = 20, 3
+    skin, sleeve, trousers, thigh = (200, 150, 120), (20, 20, 20), (235, 235, 235), 9
+    photo = np.full((120, 90, 3), trousers, np.uint8)
+    photo[10:100, 30:50] = skin
+    photo[10:30, 30:50] = sleeve
+    iuv[60:100, 54:80, 0] = thigh
+    trimmed = trim_arms(photo, iuv)[..., 0]
+    assert not trimmed[12:98, 50:54].any()
+    assert (trimmed[:, :50] == iuv[:, :50, 0])[:, 33:47].all(), "the middle is never doubted"
+    assert np.count_nonzero(trimmed[10:100, 30:50]) > 0.97 * 90 * 20, "sleeve and skin stay"
+    assert (trimmed[60:100, 54:80] == thigh).all(), "and so do the trousers' own pixels"
 
 
 def test_alpha_says_where_the_person_ends(studio) -> None:
