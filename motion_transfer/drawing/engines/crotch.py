@@ -1,0 +1,76 @@
+"""The crotch, in the colours of the clothes around it where no photo shows it.
+
+A photo that ends at the thighs, or a hand before the trousers, hides little more than the crotch,
+and of that FeatureNet guesses skin or underwear between white trousers. What a photo shows nearest
+to it is mostly the same garment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float32, Int64
+
+from motion_transfer.drawing.engines.interface import FeatureMap
+from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.textures import mirror_texture, pick_nearest, shrink_texture
+from motion_transfer.media.nearest import nearest_points
+from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core.config import COLOUR_CHANNELS
+
+TOP_METRES = -0.19  # see `UVTables.position`; legs begin 5 cm lower
+FADE_METRES = 0.03  # from there downwards: the guess of the belly goes over into it
+FARTHEST_METRES = 0.15  # what is seen farther off may be another garment
+NEIGHBOURS = 64  # seen texels whose mean it is
+ALIKE, APART = 0.1, 0.3  # colours of guess and clothes, in [-1, 1]: it stays; it is another thing
+FALL_METRES = 0.015  # farther than the nearest, they count by so much less
+
+
+def clothe_crotch(feature_map: FeatureMap, source: Source) -> FeatureMap:
+    """Give the hidden crotch the colours of what is seen nearest to it, if its own are others.
+
+    Departs from the paper: it draws what FeatureNet guesses.
+
+    Args:
+        feature_map: The network's; one without detail does not begin with colours, and stays.
+    """
+    if feature_map.detail is None:
+        return feature_map
+    size = feature_map.features.shape[-1]
+    factor = source.texture.shape[-1] // size
+    texels, around, position = _find_crotch(size)
+    texture, shown = mirror_texture(*shrink_texture(source.texture, source.visibility, factor))
+    near = around[shown.reshape(-1)[around] > 0]
+    if not len(near):
+        return feature_map
+    away, index = nearest_points(position[near], position[texels], NEIGHBOURS)
+    weights = np.exp((away[:, :1] - away) / FALL_METRES)
+    weights /= weights.sum(1, keepdims=True)
+    seen = texture.reshape(COLOUR_CHANNELS, -1)[:, near]
+    clothes = (seen[:, index] * weights).sum(2)
+    # how much of each texel no photo shows, as FeatureNet's guess counts
+    hidden = 1 - source.visibility.reshape(size, factor, size, factor).mean((1, 3)).reshape(-1)
+    features = feature_map.features.copy()
+    colours = features[0, :COLOUR_CHANNELS].reshape(COLOUR_CHANNELS, -1)  # a view
+    change = clothes - colours[:, texels]
+    share = hidden[texels] * ((TOP_METRES - position[texels, 1]) / FADE_METRES).clip(0, 1)
+    share *= away[:, 0] < FARTHEST_METRES
+    share *= ((np.abs(change).mean(0) - ALIKE) / (APART - ALIKE)).clip(0, 1)
+    colours[:, texels] += change * share.astype(np.float32)
+    return replace(feature_map, features=features)
+
+
+@lru_cache(maxsize=2)
+def _find_crotch(
+    size: int,
+) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " M"], Float32[np.ndarray, "L 3"]]:
+    """Find the crotch's texels and those of trunk and thighs, and where all texels are, metres."""
+    tables = load_uv_tables()
+    part = pick_nearest(tables.part, size).reshape(-1)
+    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1).T
+    trunk = np.isin(part, PART_GROUPS["torso"])
+    around = trunk | np.isin(part, PART_GROUPS["upper-legs"])
+    crotch = trunk & (position[:, 1] < TOP_METRES)
+    return np.flatnonzero(crotch), np.flatnonzero(around), np.ascontiguousarray(position)
