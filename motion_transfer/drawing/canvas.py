@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -57,7 +58,27 @@ class Figure:
 
 def paste(frame: Picture, rgba: Rgba, window: Window) -> None:
     """Lay a crop over the frame, in place, where its window lies."""
-    lay_over(frame, _scale(rgba, window.side), window.x, window.y)
+    if len(rgba) != window.side:
+        rgba = _scale(_go_on(rgba, window, frame.shape[:2]), window.side)
+    lay_over(frame, rgba, window.x, window.y)
+
+
+def _go_on(rgba: Rgba, window: Window, size: tuple[int, ...]) -> Rgba:
+    """Let whoever the frame's border cuts off go on beyond it, as that border is no outline.
+
+    Else scaling would mix the nothing beyond into the last row, through which a line of background
+    shows.
+    """
+    inside, around = [], []
+    for start, length in ((window.y, size[0]), (window.x, size[1])):
+        ends = np.clip([-start, length - start], 0, window.side) * len(rgba) / window.side
+        first, last = math.ceil(ends[0]), math.floor(ends[1])  # pixels that lie in the frame
+        inside.append(slice(first, last))
+        around += [first, len(rgba) - last]
+    shown = rgba[tuple(inside)]
+    if not any(around) or not shown.size:
+        return rgba
+    return cv2.copyMakeBorder(shown, *around, cv2.BORDER_REPLICATE)
 
 
 def lay_over(frame: Picture, rgba: UInt8[np.ndarray, "h w 4"], x: int, y: int) -> None:
@@ -102,8 +123,6 @@ def _scale(rgba: Rgba, side: int) -> Rgba:
     """Scale a crop; colours count by their coverage, as those of nobody mean nothing."""
     if len(rgba) < side:
         return _enlarge(rgba, side)
-    if len(rgba) == side:
-        return rgba
     weighted = cv2.cvtColor(rgba, cv2.COLOR_RGBA2mRGBA)
     scaled = cv2.resize(weighted, (side, side), interpolation=cv2.INTER_AREA)
     return cv2.cvtColor(scaled, cv2.COLOR_mRGBA2RGBA)

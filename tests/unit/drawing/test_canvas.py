@@ -75,6 +75,23 @@ def test_an_outline_that_is_enlarged_has_no_steps(scale: int, most_px: float) ->
     assert soft.max() <= scale, "it stays as sharp"
 
 
+@pytest.mark.parametrize("side", [40, 64, 100, 192])
+@pytest.mark.parametrize("share", [0.5, 0.61])
+def test_who_is_cut_off_by_the_border_is_solid_up_to_it(side: int, share: float) -> None:
+    """A driver's frame ends in the middle of somebody: there is nothing in the crop beyond it."""
+    height, width = round(share * side), round(0.9 * side)
+    window = Window(0, 0, side)
+    rgba = np.full((64, 64, 4), (*COLOUR, 255), np.uint8)
+    beyond = np.arange(64) + 0.5 > height * 64 / side  # as the frame is cut to the window
+    rgba[beyond, :, 3] = 0
+    frame = np.zeros((height, width, 3), np.uint8)
+    paste(frame, rgba, window)
+    assert (frame == COLOUR).all()
+    moved = np.zeros((height, width, 3), np.uint8)
+    paste(moved, rgba[::-1, ::-1], Window(width - side, height - side, side))
+    assert (moved == COLOUR).all()
+
+
 @pytest.mark.parametrize(("x", "y"), [(-40, 3), (3, -70), (50, 60), (200, 0), (-64, -64)])
 def test_what_reaches_beyond_the_frame_is_cut(x: int, y: int) -> None:
     frame, whole = np.zeros((70, 60, 3), np.uint8), np.zeros((400, 400, 3), np.uint8)
