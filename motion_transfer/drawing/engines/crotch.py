@@ -23,7 +23,7 @@ from nhrr_core.config import COLOUR_CHANNELS
 TOP_METRES = -0.19  # see `UVTables.position`; legs begin 5 cm lower
 FADE_METRES = 0.03  # from there downwards: the guess of the belly goes over into it
 FARTHEST_METRES = 0.15  # what is seen farther off may be another garment
-NEIGHBOURS = 64  # seen texels whose mean it is
+EVERY, NEIGHBOURS = 3, 32  # of the seen texels every third, of these the nearest: their mean
 ALIKE, APART = 0.1, 0.3  # colours of guess and clothes, in [-1, 1]: it stays; it is another thing
 FALL_METRES = 0.015  # farther than the nearest, they count by so much less
 
@@ -41,6 +41,9 @@ def clothe_crotch(feature_map: FeatureMap, source: Source) -> FeatureMap:
     size = feature_map.features.shape[-1]
     factor = source.texture.shape[-1] // size
     texels, around, position = _find_crotch(size)
+    # how much of each texel no photo shows, as FeatureNet's guess counts
+    hidden = 1 - source.visibility.reshape(size, factor, size, factor).mean((1, 3)).reshape(-1)
+    texels = texels[hidden[texels] > 0]
     texture, shown = mirror_texture(*shrink_texture(source.texture, source.visibility, factor))
     near = around[shown.reshape(-1)[around] > 0]
     if not len(near):
@@ -50,8 +53,6 @@ def clothe_crotch(feature_map: FeatureMap, source: Source) -> FeatureMap:
     weights /= weights.sum(1, keepdims=True)
     seen = texture.reshape(COLOUR_CHANNELS, -1)[:, near]
     clothes = (seen[:, index] * weights).sum(2)
-    # how much of each texel no photo shows, as FeatureNet's guess counts
-    hidden = 1 - source.visibility.reshape(size, factor, size, factor).mean((1, 3)).reshape(-1)
     features = feature_map.features.copy()
     colours = features[0, :COLOUR_CHANNELS].reshape(COLOUR_CHANNELS, -1)  # a view
     change = clothes - colours[:, texels]
@@ -66,11 +67,13 @@ def clothe_crotch(feature_map: FeatureMap, source: Source) -> FeatureMap:
 def _find_crotch(
     size: int,
 ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " M"], Float32[np.ndarray, "L 3"]]:
-    """Find the crotch's texels and those of trunk and thighs, and where all texels are, metres."""
+    """Find the crotch's texels and those near it of trunk and thighs, and where all are, metres."""
     tables = load_uv_tables()
     part = pick_nearest(tables.part, size).reshape(-1)
     position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1).T
+    height = position[:, 1]
     trunk = np.isin(part, PART_GROUPS["torso"])
-    around = trunk | np.isin(part, PART_GROUPS["upper-legs"])
-    crotch = trunk & (position[:, 1] < TOP_METRES)
-    return np.flatnonzero(crotch), np.flatnonzero(around), np.ascontiguousarray(position)
+    crotch = trunk & (height < TOP_METRES)
+    low, high = height[crotch].min() - FARTHEST_METRES, TOP_METRES + FARTHEST_METRES
+    around = (trunk | np.isin(part, PART_GROUPS["upper-legs"])) & (low < height) & (height < high)
+    return np.flatnonzero(crotch), np.flatnonzero(around)[::EVERY], np.ascontiguousarray(position)
