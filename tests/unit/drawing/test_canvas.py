@@ -57,22 +57,22 @@ def test_a_scaled_edge_holds_the_persons_colour_alone(
         assert np.abs(drawn - over(truth, under))[edge].max() <= 3
 
 
-@pytest.mark.parametrize(("scale", "most_px"), [(2, 0.25), (3, 0.2)])
-def test_an_outline_that_is_enlarged_has_no_steps(scale: int, most_px: float) -> None:
+@pytest.mark.parametrize(("scale", "most_px"), [(1.5, 0.1), (2, 0.25), (3, 0.2)])
+def test_an_outline_that_is_enlarged_has_no_steps(scale: float, most_px: float) -> None:
     """An edge that moves one pixel every second row is a line then, where it was."""
     rows, columns = np.indices((64, 64))
     rgba = np.full((64, 64, 4), (*COLOUR, 255), np.uint8)
     rgba[..., 3] *= columns < 20 + rows // 2
-    side = 64 * scale
+    side = round(64 * scale)
     frame = np.zeros((side, side, 4), np.uint8)
     paste(frame, rgba, Window(0, 0, side))
-    inner = np.arange(8 * scale, 56 * scale)  # the picture's own border is no outline
+    inner = np.arange(round(8 * scale), round(56 * scale))  # the picture's own border is no outline
     covered = frame[inner, :, 3]
     line = scale * 19.5 + (inner + 0.5) / 2
     away = covered.sum(1) / 255 - line
-    assert np.abs(away).max() < most_px  # only enlarged: 0.37 and 0.75
+    assert np.abs(away).max() < most_px  # only enlarged: 0.36, 0.37 and 0.75
     soft = ((covered > 25) & (covered < 230)).sum(1)
-    assert soft.max() <= scale, "it stays as sharp"
+    assert soft.max() <= np.ceil(scale), "it stays as sharp"
 
 
 @pytest.mark.parametrize("side", [40, 64, 100, 192])
