@@ -72,16 +72,18 @@ def _go_on(rgba: Rgba, window: Window, size: tuple[int, ...]) -> Rgba:
     Else scaling would mix the nothing beyond into the last row, through which a line of background
     shows.
     """
-    inside, around = [], []
+    inside: list[slice] = []
+    beyond: list[int] = []  # above, below, left, right
     for start, length in ((window.y, size[0]), (window.x, size[1])):
         ends = np.clip([-start, length - start], 0, window.side) * len(rgba) / window.side
         first, last = math.ceil(ends[0]), math.floor(ends[1])  # pixels that lie in the frame
         inside.append(slice(first, last))
-        around += [first, len(rgba) - last]
+        beyond += [first, len(rgba) - last]
     shown = rgba[tuple(inside)]
-    if not any(around) or not shown.size:
+    if not any(beyond) or not shown.size:
         return rgba
-    return cv2.copyMakeBorder(shown, *around, cv2.BORDER_REPLICATE)
+    above, below, left, right = beyond
+    return cv2.copyMakeBorder(shown, above, below, left, right, cv2.BORDER_REPLICATE)
 
 
 def lay_over(frame: Picture, rgba: UInt8[np.ndarray, "h w 4"], x: int, y: int) -> None:
