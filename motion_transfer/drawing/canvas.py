@@ -22,8 +22,8 @@ CHECKER_PX, CHECKER_LEVELS = 16, (255, 204)  # as editors show that nothing is t
 OUTLINE_BLUR_PX, OUTLINE_GAIN = 1.0, 2.2
 """Of a crop that is enlarged: how far its outline is blurred, and how much steeper it is then."""
 
-ALL_OF_IT = 0.5
-"""By what share of its size a crop is enlarged where that is done fully; by less, less is done."""
+FULL_STRENGTH = 0.5
+"""A crop that is enlarged by this share of its size, or more, is smoothed so; by less, less so."""
 
 SPILL = 0.1
 """Share with which a pixel's surroundings count in its colour: all of it where it has none."""
@@ -139,7 +139,7 @@ def _enlarge(rgba: Rgba, side: int) -> Rgba:
     The outline is blurred, and made as steep again as enlarging it had left it. Colours go on
     beyond it, since that moves it a little.
     """
-    strength = min(1.0, (side / len(rgba) - 1) / ALL_OF_IT)
+    strength = min(1.0, (side / len(rgba) - 1) / FULL_STRENGTH)
     weighted = cv2.cvtColor(rgba, cv2.COLOR_RGBA2mRGBA)
     around = cv2.GaussianBlur(weighted, (0, 0), OUTLINE_BLUR_PX)
     colours, alpha, blurred = rgba[..., :3].copy(), rgba[..., 3], around[..., 3]
