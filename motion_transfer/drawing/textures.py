@@ -85,6 +85,11 @@ def pick_nearest(values: Shaped[np.ndarray, "*C t t"], size: int) -> Shaped[np.n
     return values[..., at[:, None], at]
 
 
+def fall(values: Float32[np.ndarray, "*S"], first: float, last: float) -> Float32[np.ndarray, "*S"]:
+    """Fall from 1 to 0 between two values."""
+    return ((last - values) / (last - first)).clip(0, 1)
+
+
 def twins(size: int) -> tuple[Int64[np.ndarray, " L"], Int64[np.ndarray, " L"]]:
     """Give the tables `side_twin` and `depth_twin` for a texture of any size, flat."""
     tables = load_uv_tables()

@@ -88,14 +88,18 @@ class Choices:
         """Find a photo. Raises: InputError if there is none of this number."""
         return _find(self.photos, number, "source")
 
-    def motion(self, numbers: Sequence[int]) -> int:
+    def motion(self, number: int) -> Choice:
+        """Find a motion. Raises: InputError if there is none of this number."""
+        return _find(self.motions, number, "motion")
+
+    def join_motions(self, numbers: Sequence[int]) -> int:
         """Find the motion that these make: one, or the folder of frames that were sent together.
 
         Raises: InputError if there is none of one of these numbers, or no number.
         """
         if not numbers:
             raise InputError("no motion; choose one of those that are there")
-        found = [_find(self.motions, number, "motion") for number in numbers]
+        found = [self.motion(number) for number in numbers]
         return numbers[0] if len(numbers) == 1 else self.know_motion(found[0].path.parent)
 
     def backgrounds(self, *, driver: bool, photo: bool) -> list[str]:

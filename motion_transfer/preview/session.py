@@ -192,7 +192,7 @@ class Session:
 
     def ask_motion_picture(self, number: int) -> Future[bytes]:
         """Ask for a small picture of a motion that can be chosen."""
-        path = self.choices.motions[self.choices.motion([number])].path
+        path = self.choices.motion(number).path
         return self.pictures.ask(("motion", path), lambda: draw_motion(path), "motion")
 
     def _note_broken(self, driver: PreviewedDriver, index: int) -> None:
@@ -262,7 +262,7 @@ class Session:
             return
         o = self.options
         folder, suffix = self.folder / "videos", o.output.suffix or ".mp4"
-        motion = Path(self.choices.motions[self.motion].name).stem
+        motion = Path(self.choices.motion(self.motion).name).stem
         stem = Path(clean_name(f"{o.source[0].stem}_{motion}{suffix}")).stem
         asked_for = {render.options.output for render in self.renders.all}
         output, number = folder / f"{stem}{suffix}", 1
@@ -358,8 +358,8 @@ class Session:
         Raises: InputError if there is none of these numbers, or it cannot be seen from there.
         """
         with self.lock:
-            number = self.choices.motion(numbers)
-            path, background = self.choices.motions[number].path, self.options.background
+            number = self.choices.join_motions(numbers)
+            path, background = self.choices.motion(number).path, self.options.background
             turned = azimuth or None
             if turned and is_motion(path):  # of settings that are given twice, the last one counts
                 path, turned = Path(f"{path},azimuth={azimuth:g}"), None
@@ -394,7 +394,7 @@ class Session:
     def can_turn(self) -> bool:
         """Whether the motion can be seen from elsewhere: IUV is what one camera saw."""
         with self.lock:
-            path, driver = self.choices.motions[self.motion].path, self.driver
+            path, driver = self.choices.motion(self.motion).path, self.driver
         if missing_packages("people"):
             return False
         return is_motion(path) or (driver is not None and driver.opened.pictures is not None)

@@ -8,18 +8,16 @@ seen, over and over: patterns go on, and nothing moves up or down, but across na
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float32, Int64
 
-from motion_transfer.drawing.engines.interface import FeatureMap
-from motion_transfer.drawing.source import Source
-from motion_transfer.drawing.textures import mirror_texture, pick_nearest, shrink_texture
+from motion_transfer.drawing.engines.interface import Guess
+from motion_transfer.drawing.textures import fall, pick_nearest
 from nhrr_core import load_uv_tables
-from nhrr_core.config import COLOUR_CHANNELS
 
 SURROUNDINGS_METRES = 0.03  # of a texel: what a pattern stands out from
 PLAIN, PATTERNED = 0.15, 0.25  # RMS of that, of colours in [-1, 1]: folds and shadows; prints, lace
@@ -35,25 +33,13 @@ TORSO, THIGHS = (1, 2), ((7, 9), (8, 10))  # sleeves are too narrow: their edges
 SHOULDER_METRES = 0.2  # above the layout's origin a torso is no tube any more
 
 
-def continue_patterns(feature_map: FeatureMap, source: Source) -> FeatureMap:
-    """Add the patterns of a source's clothes to what a network guesses of their hidden sides.
-
-    Args:
-        feature_map: The network's; one without detail does not begin with colours, and stays.
-    """
-    if feature_map.detail is None:
-        return feature_map
-    size = feature_map.features.shape[-1]
-    factor = source.texture.shape[-1] // size
-    texture, shown = mirror_texture(*shrink_texture(source.texture, source.visibility, factor))
-    ground, pattern = _take_apart(texture, shown[0] > 0)
-    copied, gained = continue_around(np.concatenate([pattern, ground]), shown[0] > 0)
+def continue_patterns(guess: Guess) -> None:
+    """Add the patterns of a source's clothes to what a network guesses of their hidden sides."""
+    ground, pattern = _take_apart(guess.texture, guess.shown)
+    copied, gained = continue_around(np.concatenate([pattern, ground]), guess.shown)
     pattern, ground = np.split(copied, 2)
-    features = feature_map.features.copy()
-    colours = features[0, :COLOUR_CHANNELS]  # a view
-    apart = np.abs(ground - colours).mean(0)
-    colours += pattern * _fall(apart, ALIKE, APART) * gained
-    return replace(feature_map, features=features)
+    apart = np.abs(ground - guess.colours).mean(0)
+    guess.colours[:] += pattern * fall(apart, ALIKE, APART) * gained
 
 
 def _take_apart(
@@ -69,7 +55,7 @@ def _take_apart(
     ground = _mean_nearby(texture, known, reach)
     pattern = (texture - ground) * known
     strength = np.sqrt(_mean_nearby(np.square(pattern).mean(0)[None], known, reach))
-    return ground, pattern * (1 - _fall(strength, PLAIN, PATTERNED))
+    return ground, pattern * (1 - fall(strength, PLAIN, PATTERNED))
 
 
 def _mean_nearby(
@@ -78,13 +64,6 @@ def _mean_nearby(
     """Average what is known around each texel, with weights of a Gaussian, reach in texels."""
     sums = [cv2.GaussianBlur(plane * known, (0, 0), reach) for plane in values]
     return np.stack(sums) / np.maximum(cv2.GaussianBlur(known, (0, 0), reach), np.float32(1e-3))
-
-
-def _fall(
-    values: Float32[np.ndarray, "*S"], first: float, last: float
-) -> Float32[np.ndarray, "*S"]:
-    """Fall from 1 to 0 between two values."""
-    return ((last - values) / (last - first)).clip(0, 1)
 
 
 def continue_around(

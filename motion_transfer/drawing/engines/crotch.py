@@ -7,18 +7,15 @@ to it is mostly the same garment.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float32, Int64
 
-from motion_transfer.drawing.engines.interface import FeatureMap
-from motion_transfer.drawing.source import Source
-from motion_transfer.drawing.textures import mirror_texture, pick_nearest, shrink_texture
+from motion_transfer.drawing.engines.interface import Guess
+from motion_transfer.drawing.textures import fall, pick_nearest
 from motion_transfer.media.nearest import nearest_points
 from nhrr_core import PART_GROUPS, load_uv_tables
-from nhrr_core.config import COLOUR_CHANNELS
 
 TOP_METRES = -0.19  # see `UVTables.position`; legs begin 5 cm lower
 FADE_METRES = 0.03  # from there downwards: the guess of the belly goes over into it
@@ -28,39 +25,23 @@ ALIKE, APART = 0.1, 0.3  # colours of guess and clothes, in [-1, 1]: it stays; i
 FALL_METRES = 0.015  # farther than the nearest, they count by so much less
 
 
-def clothe_crotch(feature_map: FeatureMap, source: Source) -> FeatureMap:
-    """Give the hidden crotch the colours of what is seen nearest to it, if its own are others.
-
-    Departs from the paper: it draws what FeatureNet guesses.
-
-    Args:
-        feature_map: The network's; one without detail does not begin with colours, and stays.
-    """
-    if feature_map.detail is None:
-        return feature_map
-    size = feature_map.features.shape[-1]
-    factor = source.texture.shape[-1] // size
-    texels, around, position = _find_crotch(size)
-    # how much of each texel no photo shows, as FeatureNet's guess counts
-    hidden = 1 - source.visibility.reshape(size, factor, size, factor).mean((1, 3)).reshape(-1)
+def clothe_crotch(guess: Guess) -> None:
+    """Give the hidden crotch the colours of what is seen nearest to it, if its own are others."""
+    texels, around, position = _find_crotch(len(guess.shown))
+    hidden = guess.hidden.reshape(-1)
     texels = texels[hidden[texels] > 0]
-    texture, shown = mirror_texture(*shrink_texture(source.texture, source.visibility, factor))
-    near = around[shown.reshape(-1)[around] > 0]
+    near = around[guess.shown.reshape(-1)[around]]
     if not len(near):
-        return feature_map
+        return
     away, index = nearest_points(position[near], position[texels], NEIGHBOURS)
     weights = np.exp((away[:, :1] - away) / FALL_METRES)
     weights /= weights.sum(1, keepdims=True)
-    seen = texture.reshape(COLOUR_CHANNELS, -1)[:, near]
-    clothes = (seen[:, index] * weights).sum(2)
-    features = feature_map.features.copy()
-    colours = features[0, :COLOUR_CHANNELS].reshape(COLOUR_CHANNELS, -1)  # a view
-    change = clothes - colours[:, texels]
-    share = hidden[texels] * ((TOP_METRES - position[texels, 1]) / FADE_METRES).clip(0, 1)
+    texture, colours = (each.reshape(len(each), -1) for each in (guess.texture, guess.colours))
+    change = (texture[:, near[index]] * weights).sum(2) - colours[:, texels]
+    share = hidden[texels] * (1 - fall(np.abs(change).mean(0), ALIKE, APART))
+    share *= fall(position[texels, 1], TOP_METRES - FADE_METRES, TOP_METRES)
     share *= away[:, 0] < FARTHEST_METRES
-    share *= ((np.abs(change).mean(0) - ALIKE) / (APART - ALIKE)).clip(0, 1)
-    colours[:, texels] += change * share.astype(np.float32)
-    return replace(feature_map, features=features)
+    colours[:, texels] += change * share
 
 
 @lru_cache(maxsize=2)

@@ -14,8 +14,7 @@ import onnx
 from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.engines import Execution
-from motion_transfer.drawing.engines.around import continue_patterns
-from motion_transfer.drawing.engines.crotch import clothe_crotch
+from motion_transfer.drawing.engines.guesses import amend_guesses
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.outline import signed_distance
@@ -98,7 +97,7 @@ class GraphEngine(ABC):
         inputs = {name: np.ascontiguousarray(array[None]) for name, array in named.items()}
         outputs = self._encoder.run_all(inputs)
         found = FeatureMap(outputs[FEATURE_MAP], outputs.get(DETAIL))
-        return continue_patterns(clothe_crotch(found, source), source)
+        return amend_guesses(found, source)
 
     def prepare(self, sides: Collection[int]) -> None:
         for side in sides:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, Float32, UInt8
 
 from motion_transfer.drawing.source import Source
 from nhrr_core.config import ModelConfig
@@ -36,6 +36,22 @@ class FeatureMap:
 
     features: Float[np.ndarray, "1 D T T"]
     detail: Float[np.ndarray, "1 3 t t"] | None = None
+
+
+@dataclass(frozen=True)
+class Guess:
+    """The colours of a feature map, to be amended in place, and what photos show, at their size.
+
+    Attributes:
+        texture: Of what is seen, and of its mirror image.
+        shown: Where that is.
+        hidden: How much of each texel no photo shows, 0 to 1, as FeatureNet's guess counts.
+    """
+
+    colours: Float32[np.ndarray, "3 T T"]
+    texture: Float32[np.ndarray, "3 T T"]
+    shown: Bool[np.ndarray, "T T"]
+    hidden: Float32[np.ndarray, "T T"]
 
 
 class Engine(Protocol):

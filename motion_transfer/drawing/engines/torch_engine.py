@@ -15,8 +15,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.engines import Execution
-from motion_transfer.drawing.engines.around import continue_patterns
-from motion_transfer.drawing.engines.crotch import clothe_crotch
+from motion_transfer.drawing.engines.guesses import amend_guesses
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, LANES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.source import Source, cut_source
@@ -234,7 +233,7 @@ def encode_source(model: NeuralReRenderer, source: Source) -> FeatureMap:
         features = model.encode_texture(texture, visibility, clearance, shown).cpu().numpy()
         detail = model.detail(texture, visibility)
         found = FeatureMap(features, None if detail is None else detail.cpu().numpy())
-    return continue_patterns(clothe_crotch(found, source), source)
+    return amend_guesses(found, source)
 
 
 def cut_pictures(source: Source, config: ModelConfig) -> UInt8[np.ndarray, "P 6 S S"] | None:

@@ -8,6 +8,7 @@ import pytest
 
 from motion_transfer.drawing.engines import around
 from motion_transfer.drawing.engines.around import continue_around, continue_patterns, unroll_body
+from motion_transfer.drawing.engines.guesses import amend_guesses
 from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import mirror_texture, pick_nearest
@@ -81,7 +82,7 @@ def test_every_texel_lies_in_its_cell() -> None:
 
 def test_stripes_go_on_around_the_body() -> None:
     before = guess(0)
-    after = continue_patterns(before, source(striped(0.8), FRONT))
+    after = amend_guesses(before, source(striped(0.8), FRONT), [continue_patterns])
     change = after.features - before.features
     _, shown = mirror_texture(striped(1), FRONT[None].astype(np.float32))
     seen = shown[0] > 0
@@ -102,17 +103,17 @@ def test_clothes_that_are_plain_or_of_another_colour_get_no_pattern(
     contrast: float, level: float
 ) -> None:
     before = guess(level)
-    after = continue_patterns(before, source(striped(contrast), FRONT))
+    after = amend_guesses(before, source(striped(contrast), FRONT), [continue_patterns])
     assert np.array_equal(after.features, before.features)
 
 
 def test_who_shows_nothing_or_everything_stays() -> None:
     before = guess(0)
     for shown in (np.zeros((SIZE, SIZE), bool), np.ones((SIZE, SIZE), bool)):
-        after = continue_patterns(before, source(striped(0.8), shown))
+        after = amend_guesses(before, source(striped(0.8), shown), [continue_patterns])
         assert np.array_equal(after.features, before.features)
 
 
 def test_maps_that_do_not_begin_with_colours_stay() -> None:
     plain = FeatureMap(guess(0).features)
-    assert continue_patterns(plain, source(striped(0.8), FRONT)) is plain
+    assert amend_guesses(plain, source(striped(0.8), FRONT), [continue_patterns]) is plain

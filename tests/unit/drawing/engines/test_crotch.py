@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from motion_transfer.drawing.engines.crotch import FADE_METRES, TOP_METRES, clothe_crotch
+from motion_transfer.drawing.engines.guesses import amend_guesses
 from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.source import Source
 from nhrr_core import load_uv_tables
@@ -37,7 +38,7 @@ def guess(level: float) -> FeatureMap:
 
 def test_skin_between_trousers_becomes_trousers_and_nothing_else_changes() -> None:
     before = guess(SKIN)
-    after = clothe_crotch(before, source(THIGHS)).features[0]
+    after = amend_guesses(before, source(THIGHS), [clothe_crotch]).features[0]
     deep = CROTCH & (HEIGHT < TOP_METRES - FADE_METRES)
     assert np.abs(after[:3, deep] - TROUSERS).max() < 0.01
     assert (after[3:] == before.features[0, 3:]).all()
@@ -47,8 +48,11 @@ def test_skin_between_trousers_becomes_trousers_and_nothing_else_changes() -> No
 
 
 def test_what_is_seen_or_guessed_alike_stays() -> None:
-    assert (clothe_crotch(guess(SKIN), source(THIGHS | CROTCH)).features == np.float32(SKIN)).all()
-    alike = clothe_crotch(guess(TROUSERS - 0.05), source(THIGHS)).features
+    assert (
+        amend_guesses(guess(SKIN), source(THIGHS | CROTCH), [clothe_crotch]).features
+        == np.float32(SKIN)
+    ).all()
+    alike = amend_guesses(guess(TROUSERS - 0.05), source(THIGHS), [clothe_crotch]).features
     assert (alike == np.float32(TROUSERS - 0.05)).all()
 
 
@@ -58,9 +62,11 @@ def test_what_is_seen_or_guessed_alike_stays() -> None:
     ids=["nothing", "head", "chest"],
 )
 def test_a_photo_of_nothing_near_changes_nothing(shown: np.ndarray) -> None:
-    assert (clothe_crotch(guess(SKIN), source(shown)).features == np.float32(SKIN)).all()
+    assert (
+        amend_guesses(guess(SKIN), source(shown), [clothe_crotch]).features == np.float32(SKIN)
+    ).all()
 
 
 def test_features_that_begin_with_no_colours_stay() -> None:
     plain = FeatureMap(guess(SKIN).features, None)
-    assert clothe_crotch(plain, source(THIGHS)) is plain
+    assert amend_guesses(plain, source(THIGHS), [clothe_crotch]) is plain
