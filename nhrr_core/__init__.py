@@ -39,7 +39,12 @@ if TYPE_CHECKING:
         mirror_texture,
         shrink_texture,
     )
-    from nhrr_core.uv_layout import UVLayout, load_uv_layout, texture_coordinates
+    from nhrr_core.uv_layout import (
+        UVLayout,
+        load_uv_layout,
+        smooth_coordinates,
+        texture_coordinates,
+    )
     from nhrr_core.uv_tables import UVTables, load_uv_tables
 
 __all__ = [
@@ -82,6 +87,7 @@ __all__ = [
     "r1_penalty",
     "sample_features",
     "shrink_texture",
+    "smooth_coordinates",
     "texture_coordinates",
     "texture_loss",
     "unfold_clearance",
@@ -99,7 +105,7 @@ _NAMES_OF = {
     "sampling": "sample_features",
     "texture": "extract_texture fill_texture measure_surroundings merge_textures mirror_texture"
     " shrink_texture",
-    "uv_layout": "UVLayout load_uv_layout texture_coordinates",
+    "uv_layout": "UVLayout load_uv_layout smooth_coordinates texture_coordinates",
     "uv_tables": "UVTables load_uv_tables",
 }
 """What is imported late, by module: the imports above, which only type checkers read."""

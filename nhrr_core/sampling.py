@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from nhrr_core.errors import ShapeError
-from nhrr_core.uv_layout import texture_coordinates
+from nhrr_core.uv_layout import smooth_coordinates
 
 TINY = 1e-6  # far below the smallest weight that is not 0, a sixteenth
 
@@ -21,6 +21,7 @@ def sample_features(
     """Look up each pixel's feature in the UV feature map.
 
     Convention: bilinear between texel centres; beyond the outermost centres the map is constant.
+    A pixel lies where `smooth_coordinates` says.
 
     Args:
         feature_map: One map per image, or a single one (M = 1) for the whole batch.
@@ -28,7 +29,7 @@ def sample_features(
         charts: The lookup table, `UVLayout.charts`.
     Returns: The feature image; exactly 0 where the part index is 0.
     Raises: ShapeError if the number of maps is neither 1 nor that of the images.
-    Source: the paper, Sec. 3.3, Eq. 2. Departs from it: no.
+    Source: the paper, Sec. 3.3, Eq. 2. Departs from it: pixels lie between the levels of U and V.
     """
     maps, images = feature_map.shape[0], iuv.shape[0]
     if maps not in (1, images):
@@ -36,11 +37,11 @@ def sample_features(
     if iuv.device.type != "cpu":
         return _sample_everywhere(feature_map, iuv, charts)
     image = feature_map.new_zeros(images, feature_map.shape[1], *iuv.shape[2:])
+    places = smooth_coordinates(iuv, charts)
     for number, own_map in enumerate(feature_map.split(1)):
         shown = slice(None) if maps == 1 else slice(number, number + 1)
         index, row, column = (iuv[shown, 0] > 0).nonzero(as_tuple=True)  # often a tenth of all
-        body = iuv[shown][index, :, row, column].T[None, :, None]  # 1 x 3 x 1 x N
-        sampled = _sample(own_map, texture_coordinates(body, charts))
+        sampled = _sample(own_map, places[shown][index, row, column][None, None])  # 1 x 1 x N x 2
         image[shown][index, :, row, column] = sampled[0, :, 0].T
     return image
 
@@ -55,7 +56,7 @@ def _sample_everywhere(
     It is more work, but a device is not asked where the body is: nobody waits for its answer, and
     all that it does can be recorded as a CUDA graph.
     """
-    places = texture_coordinates(iuv, charts)
+    places = smooth_coordinates(iuv, charts)
     if len(feature_map) == len(places):
         sampled = _sample(feature_map, places)
     else:  # one map: images are looked up as one tall image, without a copy of the map for each

@@ -18,7 +18,7 @@ from torch import Tensor
 from nhrr_core.config import FILL_FROM, FILL_METRES, FILL_TO, PLACE_METRES
 from nhrr_core.errors import ShapeError
 from nhrr_core.iuv import check_iuv
-from nhrr_core.uv_layout import chart_index, texture_coordinates
+from nhrr_core.uv_layout import chart_index, smooth_coordinates, texture_coordinates
 from nhrr_core.uv_tables import (
     CHART_SIZE,
     MAX_CHART_STEP,
@@ -40,7 +40,8 @@ def extract_texture(
     the texels between the centres of four neighbouring pixels of one part are interpolated
     bilinearly from those; nothing is filled outside such a quad.
 
-    Convention: image and IUV have the same size, whatever it is; values pass unscaled.
+    Convention: image and IUV have the same size, whatever it is; values pass unscaled. A pixel lies
+    where `smooth_coordinates` says.
 
     Args:
         size: T, side of the texture in texels.
@@ -54,7 +55,8 @@ def extract_texture(
         raise ShapeError(f"photo {list(image.shape)} and IUV {list(iuv.shape)} do not match")
     if size < 1:
         raise ShapeError(f"texture size is {size}; it must be at least 1")
-    place = texture_coordinates(iuv, charts)
+    place = smooth_coordinates(iuv, charts)
+    moved = place - texture_coordinates(iuv, charts)
     colours = image.permute(0, 2, 3, 1)
     batch = torch.arange(image.shape[0], device=image.device)[:, None, None]
     texels = image.shape[0] * size * size
@@ -67,7 +69,7 @@ def extract_texture(
     axes = charts.view(-1, 2).T.to(precise).contiguous()
     fill_total, fill_count = torch.zeros_like(total), torch.zeros_like(count)
     for steps, quads in _quads_by_steps(iuv, place, size):
-        points, texel = _fill_points(colours, iuv, axes, quads, steps, hit, size)
+        points, texel = _fill_points(colours, iuv, moved, axes, quads, steps, hit, size)
         more_total, more_count = _scatter(points, texel, texels)
         fill_total, fill_count = fill_total + more_total, fill_count + more_count
 
@@ -259,6 +261,7 @@ def _quads_by_steps(
 def _fill_points(
     colours: Float[Tensor, "B H W C"],
     iuv: UInt8[Tensor, "B 3 H W"],
+    moved: Float[Tensor, "B H W 2"],
     axes: Float[Tensor, "2 L"],
     quads: Int64[Tensor, "Q 3"],
     steps: int,
@@ -268,6 +271,9 @@ def _fill_points(
     """Colours and texels of steps x steps points spread evenly inside each quad.
 
     Those in texels that are hit, about half of them, are left out.
+
+    Args:
+        moved: How far from its entry in the table each pixel lies.
     """
     line = (torch.arange(steps, device=iuv.device, dtype=axes.dtype) + 0.5) / steps
     down, right = (axis.reshape(-1) for axis in torch.meshgrid(line, line, indexing="ij"))
@@ -280,7 +286,12 @@ def _fill_points(
         _bilinear([corner[:, channel, None].to(axes.dtype) for corner in corner_iuv], down, right)
         for channel in (1, 2)
     )
-    x, y = _place_between_entries(axes, corner_iuv[0][:, :1].long(), u, v)
+    places = _place_between_entries(axes, corner_iuv[0][:, :1].long(), u, v)
+    moves = [moved[corner].to(axes.dtype) for corner in corners]
+    x, y = (
+        place + _bilinear([move[:, axis, None] for move in moves], down, right)
+        for axis, place in enumerate(places)
+    )
     texel = _texel(x, y, batch[:, None], size).flatten()
     open_texels = (~hit.index_select(0, texel)).nonzero()[:, 0]
     shares = [(1 - down, down), (1 - right, right)]

@@ -36,6 +36,17 @@ MAX_ENTRY_STEP = 0.03
 SAMPLES_PER_TEXEL = 3.0
 """How dense points fill between pixels along each axis: no texel is missed where charts bend."""
 
+# How finely pixels lie in the texture: see `smooth_coordinates`. Measured on real photos.
+
+WORD = 65535
+"""Charts are kept in words of 16 bits: sums of some of these are exact, in whatever order."""
+
+SMOOTHED_OVER = (3, 7)
+"""Sides of the squares, px, over which places are averaged."""
+
+MAX_SPREAD = 0.03
+"""A square whose places lie further apart, as a share of the texture's side, may hold a seam."""
+
 
 @dataclass(frozen=True)
 class UVTables:
@@ -73,7 +84,7 @@ def load_uv_tables() -> UVTables:
     # tenths of a millimetre, signed
     tenths = _undo_differences(position_words.reshape(3, TWIN_SIZE, TWIN_SIZE)).view(np.int16)
     return UVTables(
-        charts=np.ascontiguousarray(np.moveaxis(charts, 0, -1), np.float32) / np.float32(65535),
+        charts=np.ascontiguousarray(np.moveaxis(charts, 0, -1), np.float32) / np.float32(WORD),
         side_twin=side.reshape(TWIN_SIZE, TWIN_SIZE).astype(np.int64),
         depth_twin=depth.reshape(TWIN_SIZE, TWIN_SIZE).astype(np.int64),
         position=np.ascontiguousarray(np.moveaxis(tenths, 0, -1), np.float32) / np.float32(10_000),

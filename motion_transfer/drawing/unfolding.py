@@ -1,8 +1,8 @@
 """A photo unfolded into UV space, for one picture and without torch, which takes a second to load.
 
-These are the twins of `extract_texture` and `unfold_clearance` in `nhrr_core`, which batches,
-gradients and GPUs need, and which are the specification: tests hold these to them. On a CPU these
-are two to three times as fast.
+These are the twins of `smooth_coordinates`, `extract_texture` and `unfold_clearance` in
+`nhrr_core`, which batches, gradients and GPUs need, and which are the specification: tests hold
+these to them. On a CPU these are two to three times as fast.
 
 Convention: images have their channels last, maps have them first, and neither has a batch axis;
 places are (x, y), along the first axis, in [0, 1] of the texture.
@@ -14,8 +14,9 @@ from collections.abc import Iterator
 from functools import cache
 from typing import NamedTuple
 
+import cv2
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int64, Shaped, UInt8
+from jaxtyping import Bool, Float32, Float64, Int32, Int64, Shaped, UInt8, UInt16
 
 from nhrr_core import load_uv_tables
 from nhrr_core.config import CLEARANCE_SIZE, UNIT_TEXELS
@@ -23,8 +24,11 @@ from nhrr_core.uv_tables import (
     CHART_SIZE,
     MAX_CHART_STEP,
     MAX_ENTRY_STEP,
+    MAX_SPREAD,
     MAX_STRETCH,
     SAMPLES_PER_TEXEL,
+    SMOOTHED_OVER,
+    WORD,
 )
 
 POINTS_AT_ONCE = 2**16
@@ -32,17 +36,22 @@ POINTS_AT_ONCE = 2**16
 
 CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a quad: down, right
 
+CODE_WEIGHTS = np.array([CHART_SIZE**2, 1, CHART_SIZE], np.float32)
+"""(I, U, V) to an entry behind one chart more; below 2**24, hence exact in float32."""
+
 
 class Charts(NamedTuple):
     """The tables' charts as they are looked up fastest.
 
     Attributes:
         x, y: Where each entry lies in the texture, in the order of part, V, U.
+        words: The same, times WORD, in pairs.
         torn: Whether a seam of the texture runs between an entry and the next ones.
     """
 
     x: Float32[np.ndarray, " L"]
     y: Float32[np.ndarray, " L"]
+    words: UInt16[np.ndarray, "L 2"]
     torn: Bool[np.ndarray, " L"]
 
 
@@ -53,19 +62,57 @@ def _charts() -> Charts:
     for chart, own in zip(axes.swapaxes(0, 1), torn, strict=True):  # which a core's cache holds
         own[:-1, :-1] = (_spans(chart) > MAX_ENTRY_STEP).any(0)
     x, y = axes.reshape(2, -1)
-    return Charts(x, y, torn.reshape(-1))
+    words = np.rint(np.column_stack([x, y]) * np.float32(WORD)).astype(np.uint16)
+    return Charts(x, y, words, torn.reshape(-1))
 
 
-def chart_entries(iuv: UInt8[np.ndarray, "... 3"]) -> Int64[np.ndarray, "*shape"]:
+def chart_entries(iuv: UInt8[np.ndarray, "*S 3"]) -> Int32[np.ndarray, "*S"]:
     """Tell each pixel's entry in the flat tables of charts; the background's is one of part 1."""
-    part, u, v = (iuv[..., channel].astype(np.int64) for channel in range(3))
-    return (np.maximum(part - 1, 0) * CHART_SIZE + v) * CHART_SIZE + u
+    entries = (iuv.astype(np.float32) @ CODE_WEIGHTS).astype(np.int32)
+    np.subtract(entries, CHART_SIZE**2, out=entries, where=entries >= CHART_SIZE**2)
+    return entries
 
 
 def texture_coordinates(iuv: UInt8[np.ndarray, "... 3"]) -> Float32[np.ndarray, "2 ..."]:
     """Look up where each pixel lies in the texture; undefined where I is 0."""
     charts, entry = _charts(), chart_entries(iuv)
     return np.stack([charts.x.take(entry), charts.y.take(entry)])
+
+
+def smooth_coordinates(iuv: UInt8[np.ndarray, "H W 3"]) -> Float32[np.ndarray, "2 H W"]:
+    """Look up where each pixel lies, between levels of U and V, see `nhrr_core.smooth_coordinates`.
+
+    Where I is 0, so is the place.
+    """
+    places = np.zeros((2, *iuv.shape[:2]), np.float32)
+    left, top, width, height = cv2.boundingRect(np.ascontiguousarray(iuv[..., 0]))
+    if not width:
+        return places
+    person = np.s_[top : top + height, left : left + width]
+    part = np.ascontiguousarray(iuv[person][..., 0])
+    words = cv2.split(_charts().words.take(chart_entries(iuv[person]), axis=0))
+    fine = np.stack(words) / np.float32(WORD)
+    for side in SMOOTHED_OVER:
+        # beyond the person: no part is 0
+        low, high = _extremes(part, side)
+        alike = (low == high) & (part > 0)
+        for axis in words:
+            low, high = _extremes(axis, side)
+            alike &= high - low <= MAX_SPREAD * WORD
+        for own, axis in zip(fine, words, strict=True):
+            total = cv2.boxFilter(axis, cv2.CV_32F, (side, side), normalize=False)
+            np.divide(total, np.float32(side**2 * WORD), out=own, where=alike)
+    places[:, *person] = fine * (part > 0)
+    return places
+
+
+def _extremes(
+    plane: Shaped[np.ndarray, "H W"], side: int
+) -> tuple[Shaped[np.ndarray, "H W"], Shaped[np.ndarray, "H W"]]:
+    """The lowest and the highest value in the square around each pixel; 0 lies beyond the edge."""
+    square = np.ones((side, side), np.uint8)
+    low = cv2.erode(plane, square, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    return low, cv2.dilate(plane, square)
 
 
 def texel_index(place: Float32[np.ndarray, "2 ..."], size: int) -> Int64[np.ndarray, "*shape"]:
@@ -100,12 +147,13 @@ def extract_texture(
             side; with fewer than the default some texels are missed.
     Returns: The texture, 0 where unseen; and the visibility, 1 where seen and 0 elsewhere.
     """
-    place, seen = texture_coordinates(iuv), iuv[..., 0] > 0
+    place, seen = smooth_coordinates(iuv), iuv[..., 0] > 0
+    moved = place - texture_coordinates(iuv)
     total, count = np.zeros((image.shape[-1], size**2)), np.zeros(size**2, np.int64)
     _add(total, count, texel_index(place[:, seen], size), image[seen].T)
     unhit = count == 0  # what is interpolated only fills where no pixel landed
     for steps, row, column in _quads_by_steps(iuv, place, size, samples_per_texel):
-        found = list(_fill_points(image, iuv, row, column, steps, unhit, size))
+        found = list(_fill_points(image, iuv, moved, row, column, steps, unhit, size))
         texels, colours = (np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True))
         _add(total, count, texels, colours)
     texture = (total / np.maximum(count, 1)).astype(np.float32)
@@ -159,6 +207,7 @@ def _quads_by_steps(
 def _fill_points(
     image: Float32[np.ndarray, "H W C"],
     iuv: UInt8[np.ndarray, "H W 3"],
+    moved: Float32[np.ndarray, "2 H W"],
     row: Int64[np.ndarray, " Q"],
     column: Int64[np.ndarray, " Q"],
     steps: int,
@@ -168,6 +217,9 @@ def _fill_points(
     """Texels and colours of steps x steps points spread evenly inside each quad.
 
     Those in texels that are hit, about half of them, are left out.
+
+    Args:
+        moved: How far from its entry in the table each pixel lies.
     """
     line = ((np.arange(steps) + 0.5) / steps).astype(np.float32)
     down, right = (axis.reshape(-1) for axis in np.meshgrid(line, line, indexing="ij"))
@@ -181,6 +233,7 @@ def _fill_points(
         )
         # multiples of a power of two, hence exact
         place = _place_between_entries(part[:, :1], u @ weights, v @ weights)
+        place += np.stack([moved[:, *corner] for corner in corners], -1) @ weights
         texel = texel_index(place, size).reshape(-1)
         kept = unhit.take(texel).nonzero()[0]
         colours = np.stack([image[corner] for corner in corners], -1).swapaxes(0, 1)  # C x Q x 4

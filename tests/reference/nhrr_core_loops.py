@@ -16,6 +16,8 @@ MAX_CHART_STEP = 0.15 * 255
 MAX_STRETCH = 1 / 16
 SAMPLES_PER_TEXEL = 3.0
 MAX_ENTRY_STEP = 0.03
+SQUARES = (7, 3)
+MAX_SPREAD = 0.03
 
 
 def extract_texture_loops(
@@ -30,9 +32,9 @@ def extract_texture_loops(
         points: dict[tuple[int, int], list[Tensor]] = defaultdict(list)
         for y in range(height):
             for x in range(width):
-                part, u, v = iuv[b, :, y, x].tolist()
-                if part > 0:
-                    pixels[_texel(_place(charts, part, u, v), size)].append(image[b, :, y, x])
+                if iuv[b, 0, y, x] > 0:
+                    place = smooth_place(iuv[b], charts, y, x)
+                    pixels[_texel(place, size)].append(image[b, :, y, x])
         for y in range(height - 1):
             for x in range(width - 1):
                 for texel, colour in _points_of_quad(image[b], iuv[b], charts, size, y, x):
@@ -55,10 +57,9 @@ def sample_features_loops(feature_map: Tensor, iuv: Tensor, charts: Tensor) -> T
         texels = feature_map[b if maps > 1 else 0]
         for y in range(height):
             for x in range(width):
-                part, u, v = iuv[b, :, y, x].tolist()
-                if part == 0:
+                if iuv[b, 0, y, x] == 0:
                     continue
-                across, down = _place(charts, part, u, v)
+                across, down = smooth_place(iuv[b], charts, y, x)
                 left, right, to_right = _between_centres(across, columns)
                 top, bottom, to_bottom = _between_centres(down, rows)
                 out[b, :, y, x] = (
@@ -68,6 +69,25 @@ def sample_features_loops(feature_map: Tensor, iuv: Tensor, charts: Tensor) -> T
                     + texels[:, bottom, right] * to_bottom * to_right
                 )
     return out
+
+
+def smooth_place(iuv: Tensor, charts: Tensor, y: int, x: int) -> tuple[float, float]:
+    """Where a pixel lies: the mean of the largest square of one part and without a tear."""
+    part = int(iuv[0, y, x])
+    for side in SQUARES:
+        reach = side // 2
+        rows, columns = (range(at - reach, at + reach + 1) for at in (y, x))
+        if min(rows[0], columns[0]) < 0:
+            continue
+        if rows[-1] >= iuv.shape[1] or columns[-1] >= iuv.shape[2]:
+            continue
+        around = [iuv[:, row, column].tolist() for row in rows for column in columns]
+        if any(other != part for other, _, _ in around):
+            continue
+        across, down = zip(*(_place(charts, *pixel) for pixel in around), strict=True)
+        if max(max(axis) - min(axis) for axis in (across, down)) <= MAX_SPREAD:
+            return sum(across) / len(around), sum(down) / len(around)
+    return _place(charts, *iuv[:, y, x].tolist())
 
 
 def _points_of_quad(
@@ -80,7 +100,8 @@ def _points_of_quad(
         return []
     if max(us) - min(us) > MAX_CHART_STEP or max(vs) - min(vs) > MAX_CHART_STEP:
         return []
-    places = [_place(charts, *corner) for corner in zip(parts, us, vs, strict=True)]
+    entries = [_place(charts, *corner) for corner in zip(parts, us, vs, strict=True)]
+    places = [smooth_place(iuv, charts, row, column) for row, column in corners]
     stretch = max(max(axis) - min(axis) for axis in zip(*places, strict=True))
     if stretch > MAX_STRETCH or stretch * size <= 1:
         return []
@@ -102,7 +123,13 @@ def _points_of_quad(
             colour = torch.zeros_like(image[:, y, x])
             for weight, (row, column) in zip(weights, corners, strict=True):
                 colour = colour + weight * image[:, row, column]
-            points.append((_texel(_place_between(charts, parts[0], u, v), size), colour))
+            across, down = _place_between(charts, parts[0], u, v)
+            for weight, (from_x, from_y), (to_x, to_y) in zip(
+                weights, entries, places, strict=True
+            ):
+                across += weight * (to_x - from_x)
+                down += weight * (to_y - from_y)
+            points.append((_texel((across, down), size), colour))
     return points
 
 

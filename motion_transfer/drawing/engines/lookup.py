@@ -6,15 +6,12 @@ takes six times as long.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from jaxtyping import Float32, Int32, UInt8
 
 from motion_transfer.drawing.engines.interface import FeatureMap
-from motion_transfer.drawing.unfolding import chart_entries
+from motion_transfer.drawing.unfolding import smooth_coordinates
 from nhrr_core.config import CLEARANCE_SIZE, COLOUR_CHANNELS, DETAIL_FULL, DETAIL_NONE
-from nhrr_core.uv_tables import load_uv_tables
 
 
 class FeatureRows:
@@ -38,10 +35,10 @@ class FeatureRows:
             scale: What `pixels_per_texel` measured of the body.
         """
         body = np.flatnonzero(iuv[..., 0])
-        entries = chart_entries(iuv.reshape(-1, 3)[body])
-        features = self._features.at(entries)
+        places = smooth_coordinates(iuv).reshape(2, -1)[:, body]
+        features = self._features.at(places)
         if self._detail is not None and (share := detail_share(scale, self._detail.size)):
-            features[:, :COLOUR_CHANNELS] += share * self._detail.at(entries)
+            features[:, :COLOUR_CHANNELS] += share * self._detail.at(places)
         looked_up = np.zeros((iuv.shape[0] * iuv.shape[1], features.shape[1]), np.float32)
         looked_up[body] = features
         return looked_up.reshape(1, *iuv.shape[:2], -1)
@@ -64,12 +61,15 @@ class _Rows:
         self.size = values.shape[-1]
         self._rows = np.ascontiguousarray(values.reshape(values.shape[1], -1).T)
 
-    def at(self, entries: Int32[np.ndarray, " N"]) -> Float32[np.ndarray, "N C"]:
-        """Look up, bilinearly, where rows of the flat table of charts say."""
-        first, shares = _corners(self.size)
-        corner, right, down = first[entries], *(share[entries, None] for share in shares)
-        above = self._between(corner, right)
-        below = self._between(corner + self.size, right)
+    def at(self, places: Float32[np.ndarray, "2 N"]) -> Float32[np.ndarray, "N C"]:
+        """Look up, bilinearly; beyond the outermost centres the map is constant."""
+        centres = places * np.float32(self.size) - np.float32(0.5)
+        corner = np.floor(centres).clip(0, self.size - 2)
+        right, down = (centres - corner).clip(0, 1)[..., None]
+        column, row = corner.astype(np.int32)
+        first = row * np.int32(self.size) + column
+        above = self._between(first, right)
+        below = self._between(first + self.size, right)
         below -= above
         below *= down
         below += above
@@ -85,18 +85,3 @@ class _Rows:
         step *= right
         step += here
         return step
-
-
-@lru_cache(maxsize=4)
-def _corners(
-    size: int,
-) -> tuple[Int32[np.ndarray, " N"], tuple[Float32[np.ndarray, " N"], Float32[np.ndarray, " N"]]]:
-    """The texel to the upper left of each row of the flat table of charts, and how far from it.
-
-    Beyond the outermost centres the map is constant.
-    """
-    places = load_uv_tables().charts.reshape(-1, 2) * np.float32(size) - np.float32(0.5)
-    corner = np.floor(places).clip(0, size - 2)
-    right, down = (places - corner).clip(0, 1).T
-    column, row = corner.astype(np.int32).T
-    return row * np.int32(size) + column, (np.ascontiguousarray(right), np.ascontiguousarray(down))

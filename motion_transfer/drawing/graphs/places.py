@@ -17,10 +17,16 @@ from nhrr_core.config import (
     FILL_TO,
     PLACE_METRES,
 )
-from nhrr_core.uv_tables import CHART_SIZE, UVTables, load_uv_tables
+from nhrr_core.uv_tables import (
+    CHART_SIZE,
+    MAX_SPREAD,
+    SMOOTHED_OVER,
+    WORD,
+    UVTables,
+    load_uv_tables,
+)
 
 TINY = 1e-6  # far below the smallest weight that is not 0, a sixteenth
-WORD = 65535.0  # the largest of 16 bits
 LEAST = 1e-20  # likewise of a place's weight, even across the whole body
 
 
@@ -140,7 +146,33 @@ def find_places(graph: Graph, iuv: str) -> str:
         graph("Slice", found, *(np.array([number]) for number in (first, first + 2, 3)))
         for first in (0, 2)
     )
-    return graph("Div", graph("Add", low, graph("Mul", high, 256)), WORD)
+    return graph("Div", graph("Add", low, graph("Mul", high, 256)), float(WORD))
+
+
+def smooth_places(graph: Graph, iuv: str, places: str) -> str:
+    """Tell where pixels lie between the levels of U and V, see `nhrr_core.smooth_coordinates`.
+
+    Args:
+        places: What `find_places` found.
+    Returns: The places, as they came.
+    """
+    part = graph("Unsqueeze", graph("Gather", iuv, np.array(0), axis=3), np.array([1]))
+    fine = graph("Transpose", places, perm=[0, 3, 1, 2])
+    known = graph.join(graph("Cast", part, to=FLOAT), fine)
+    for side in SMOOTHED_OVER:
+        reach = side // 2
+        pads = np.array([0, 0, reach, reach, 0, 0, reach, reach])
+        around = graph("Pad", known, pads, -1)  # beyond the image: no part is -1
+        window = {"kernel_shape": [side, side], "strides": [1, 1]}
+        highest = graph("MaxPool", around, **window)
+        lowest = graph("Neg", graph("MaxPool", graph("Neg", around), **window))
+        spread = graph("Sub", highest, lowest)
+        # a part is a whole number
+        limits = np.array([0.5, MAX_SPREAD, MAX_SPREAD], np.float32)[:, None, None]
+        over = graph("ReduceMax", graph("Sub", spread, limits), axes=[1])
+        mean = graph.part(graph("AveragePool", around, **window), 1, 3)
+        fine = graph("Where", graph("Less", over, 0), mean, fine)
+    return graph("Transpose", fine, perm=[0, 2, 3, 1])
 
 
 def _chart_rows(graph: Graph, iuv: str) -> str:

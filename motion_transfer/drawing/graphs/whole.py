@@ -26,6 +26,7 @@ from motion_transfer.drawing.graphs.places import (
     pixels_per_texel,
     resize_nearest,
     signed_distance,
+    smooth_places,
     spread_colours,
     texel_positions,
 )
@@ -231,7 +232,7 @@ def _append_sampler(
         distance, unit = DISTANCE, UNIT
     else:
         body, places = find_body(graph, iuv), find_places(graph, iuv)
-        grid = graph("Sub", graph("Mul", places, 2), 1)
+        grid = graph("Sub", graph("Mul", smooth_places(graph, iuv, places), 2), 1)
         sampled = look_up(graph, FEATURE_MAP, grid, body)
         scale = pixels_per_texel(graph, places, body) if config.told_scale else ""
         if config.has_detail:

@@ -12,7 +12,7 @@ from motion_transfer.drawing.engines.interface import FeatureMap, Occupied
 from motion_transfer.drawing.source import Source
 
 Appearance = FeatureMap | Shaped[np.ndarray, "..."]
-"""What a renderer knows of a source: the network's feature map, or the table of its texture."""
+"""What a renderer knows of a source: the network's feature map, or its completed texture."""
 
 
 class Renderer(Protocol):

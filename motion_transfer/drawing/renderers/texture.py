@@ -18,9 +18,10 @@ from motion_transfer.drawing.engines.interface import Occupied
 from motion_transfer.drawing.renderers.interface import Appearance
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import mirror_texture, pick_nearest
+from motion_transfer.drawing.unfolding import smooth_coordinates
 from motion_transfer.media.nearest import nearest_points
-from nhrr_core import PART_COUNT, PART_GROUPS, load_uv_tables
-from nhrr_core.uv_tables import CHART_SIZE, TWIN_SIZE
+from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core.uv_tables import TWIN_SIZE
 
 TEXTURE_SIZE = 256
 NEIGHBOURS = 12  # seen texels that a hidden one is mixed from; chosen by eye
@@ -28,9 +29,6 @@ OWN_SHARE = 0.05  # of a limb's texels: with fewer known, its own colours say to
 REFLECTION_METRES = 0.05  # patterns continue so far, then fade over as much again
 NEAR_METRES = 0.01  # distances below this count alike, so that a single texel cannot dominate
 EDGE_BLUR_SHARE = 1 / 180  # of the crop's side: the width over which the outline fades
-
-CODE_WEIGHTS = np.array([[CHART_SIZE**2, 1, CHART_SIZE]], np.float32)
-"""(I, U, V) to its row in the table; below 2**24, hence exact in float32."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,8 @@ class TextureRecipe:
         pass
 
     def appearance_of(self, source: Source) -> Appearance:
-        return tabulate_texture(source)
+        completed = complete_texture(source.texture, source.visibility).transpose(1, 2, 0)
+        return np.rint((completed + 1) * 127.5).clip(0, 255).astype(np.uint8)
 
     def renderer(self, appearance: Appearance) -> TextureRenderer:
         assert isinstance(appearance, np.ndarray)
@@ -61,18 +60,14 @@ class TextureRecipe:
 
 
 class TextureRenderer:
-    """Draws a source by looking up each (I, U, V) in a table of its 25 x 256 x 256 colours.
-
-    8-bit IUV has no more values than that, so the texture is sampled once per source, as the
-    network samples its feature map, and a frame costs one look-up a pixel.
-    """
+    """Draws a source by looking each pixel up in its completed texture, bilinearly."""
 
     name = "texture"
     occupies: Occupied = "nothing"
     feature_channels = 0
 
-    def __init__(self, table: UInt8[np.ndarray, "25 256 256 4"]) -> None:
-        self._table = table.view(np.uint32).reshape(-1)
+    def __init__(self, texture: UInt8[np.ndarray, "256 256 3"]) -> None:
+        self._texture = texture
 
     def working_size(self, window_side: int) -> int:
         return window_side
@@ -95,23 +90,14 @@ class TextureRenderer:
         if not width:
             return
         person = np.s_[top : top + height, left : left + width]
-        index = cv2.transform(iuv[person].astype(np.float32), CODE_WEIGHTS).astype(np.int32)
-        picture[person] = self._table.take(index).view(np.uint8).reshape(height, width, 4)
+        # to texels, whose first one's centre lies at 0
+        x, y = smooth_coordinates(iuv[person]) * np.float32(TWIN_SIZE) - np.float32(0.5)
+        border = cv2.BORDER_REPLICATE
+        colours = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderMode=border)
+        body = cv2.compare(iuv[person][..., 0], 0, cv2.CMP_GT)
+        opaque = cv2.cvtColor(colours, cv2.COLOR_RGB2RGBA)
+        cv2.copyTo(opaque, body, picture[person])
         picture[..., 3] = soften(picture[..., 3])
-
-
-def tabulate_texture(source: Source) -> UInt8[np.ndarray, "25 256 256 4"]:
-    """Look up the completed texture for every (I, V, U): RGB, and coverage, 0 for part 0."""
-    texture = complete_texture(source.texture, source.visibility).transpose(1, 2, 0)
-    # from (x, y) in [0, 1] to texels, whose first one's centre lies at 0
-    place = load_uv_tables().charts.reshape(-1, CHART_SIZE, 2) * TWIN_SIZE - np.float32(0.5)
-    x, y, border = place[..., 0], place[..., 1], cv2.BORDER_REPLICATE
-    colours = cv2.remap(texture, x, y, cv2.INTER_LINEAR, borderMode=border)
-    table = np.zeros((PART_COUNT + 1, CHART_SIZE, CHART_SIZE, 4), np.uint8)
-    levels = np.rint((colours + 1) * 127.5).clip(0, 255)
-    table[1:, ..., :3] = levels.reshape(PART_COUNT, CHART_SIZE, CHART_SIZE, 3)
-    table[1:, ..., 3] = 255
-    return table
 
 
 def soften(mask: UInt8[np.ndarray, "S S"]) -> UInt8[np.ndarray, "S S"]:

@@ -17,6 +17,7 @@ from motion_transfer.drawing.unfolding import (
     extract_texture,
     keep_parts,
     pixels_per_texel,
+    smooth_coordinates,
     texel_index,
     texture_coordinates,
     unfold_clearance,
@@ -73,12 +74,17 @@ def photo_of(iuv: Iuv, channels: int = 3) -> Float32[np.ndarray, "H W C"]:
     return random.uniform(-1, 1, (*iuv.shape[:2], channels)).astype(np.float32)
 
 
-def assert_unfolds_alike(image: np.ndarray, iuv: Iuv, size: int, *, within: float = 1e-6) -> None:
+def assert_unfolds_alike(
+    image: np.ndarray, iuv: Iuv, size: int, *, within: float = 1e-6, apart: int = 0
+) -> None:
+    """The same values, but for so many that differ by what one of several points makes."""
     texture, visibility = extract_texture(image, iuv, size)
     wanted, seen = nhrr_core.extract_texture(stack(image), stack(iuv), CHARTS, size)
     assert texture.dtype == visibility.dtype == np.float32
     np.testing.assert_array_equal(visibility, seen[0])
-    np.testing.assert_allclose(texture, wanted[0], rtol=0, atol=within)
+    away = np.abs(texture - wanted[0].numpy())
+    assert np.count_nonzero(away > within) <= apart
+    assert away.max() < 0.1
 
 
 @pytest.mark.parametrize("size", [1, 33, 128, 256])
@@ -91,12 +97,15 @@ def test_a_texture_is_that_of_its_twin(iuv: Iuv, size: int) -> None:
     ("photo", "size"), [("demo/source.png", 256), ("densepose_demo/demo_im.jpg", 512)]
 )
 def test_so_is_that_of_a_photo(request, photo: str, size: int) -> None:
-    """Within what torch's sums in float32 lose where many pixels fall into one texel."""
+    """Within what torch's sums in float32 lose where many pixels fall into one texel.
+
+    Of the points that fill between pixels, one may lie on the border of two texels.
+    """
     folder = DEMO.parent if photo.startswith("demo") else request.getfixturevalue("samples")
     path = folder / photo
     rgb, iuv = (cv2.imread(str(p)) for p in (path, path.with_name(f"{path.stem}_IUV.png")))
     assert rgb is not None and iuv is not None
-    assert_unfolds_alike(rgb.astype(np.float32) / 127.5 - 1, iuv, size, within=5e-5)
+    assert_unfolds_alike(rgb.astype(np.float32) / 127.5 - 1, iuv, size, within=5e-5, apart=6)
 
 
 def test_nobody_is_seen_nowhere() -> None:
@@ -115,6 +124,18 @@ def test_places_are_those_of_the_charts(iuv: Iuv) -> None:
     place = texture_coordinates(iuv)
     wanted = nhrr_core.texture_coordinates(stack(iuv), CHARTS)[0]
     np.testing.assert_array_equal(place, np.moveaxis(wanted.numpy(), -1, 0))
+
+
+def test_places_between_levels_are_those_of_the_twin(iuv: Iuv) -> None:
+    """Bit for bit, as texels are told apart by them."""
+    place, body = smooth_coordinates(iuv), iuv[..., 0] > 0
+    wanted = nhrr_core.smooth_coordinates(stack(iuv), CHARTS)[0].permute(2, 0, 1).numpy()
+    np.testing.assert_array_equal(place[:, body], wanted[:, body])
+    assert not place[:, ~body].any()
+
+
+def test_nobody_lies_nowhere() -> None:
+    assert not smooth_coordinates(np.zeros((9, 5, 3), np.uint8)).any()
 
 
 def test_texels_are_counted_by_rows() -> None:

@@ -51,6 +51,7 @@ PUBLIC_NAMES = {
     "r1_penalty",
     "sample_features",
     "shrink_texture",
+    "smooth_coordinates",
     "texture_coordinates",
     "texture_loss",
     "unfold_clearance",

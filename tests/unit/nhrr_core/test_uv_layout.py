@@ -1,10 +1,17 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from nhrr_core import PART_NAMES, UVLayout, load_uv_layout, texture_coordinates
+from nhrr_core import (
+    PART_NAMES,
+    UVLayout,
+    load_uv_layout,
+    smooth_coordinates,
+    texture_coordinates,
+)
 from nhrr_core.uv_layout import chart_index
 
 SIDE_PAIRS = [(1, 1), (2, 2), (3, 4), (6, 5), (7, 8), (9, 10), (11, 12), (13, 14)]
@@ -72,6 +79,57 @@ def test_texture_coordinates_look_up_part_v_u(layout: UVLayout) -> None:
     for b, y, x in [(0, 0, 0), (1, 4, 3), (0, 2, 1)]:
         part, u, v = iuv[b, :, y, x].tolist()
         assert torch.equal(place[b, y, x], layout.charts[part - 1, v, u])
+
+
+def slope(height: int, width: int, *, repeated: int = 1) -> tuple[Tensor, Tensor]:
+    """IUV of a trunk whose V falls by 0.4 levels a row, and V as it is before it is rounded.
+
+    Args:
+        repeated: How many rows and columns come from one of a smaller picture.
+    """
+    down = (torch.arange(height) // repeated * repeated)[:, None].expand(height, width)
+    right = torch.arange(width).expand(height, width)
+    exact = 100 + 0.4 * torch.arange(height)[:, None].expand(height, width)
+    v, u = 100 + 0.4 * down, 120 + 0.3 * right
+    levels = [torch.full((height, width), 2), u.round(), v.round()]
+    return torch.stack(levels)[None].to(torch.uint8), exact + 0.2 * (1 - repeated)
+
+
+@pytest.mark.parametrize(("repeated", "within"), [(1, 0.1), (2, 0.25)])
+def test_places_lie_between_the_levels_of_v(
+    plain_charts: Tensor, repeated: int, within: float
+) -> None:
+    iuv, exact = slope(40, 40, repeated=repeated)
+    inner = np.s_[0, 3:-3, 3:-3]
+    coarse, fine = (
+        place(iuv, plain_charts)[inner][..., 1] * 256 - 0.5
+        for place in (texture_coordinates, smooth_coordinates)
+    )
+    wanted = exact[3:-3, 3:-3]
+    off_coarse, off_fine = ((one - wanted).abs().max().item() for one in (coarse, fine))
+    assert off_coarse > 0.39
+    assert off_fine < within
+
+
+def test_places_at_a_parts_border_and_the_images_are_as_the_charts_say(layout: UVLayout) -> None:
+    iuv, _ = slope(12, 12)
+    iuv[0, 0, :, 6:] = 1
+    raw, fine = (
+        place(iuv, layout.charts)[0] for place in (texture_coordinates, smooth_coordinates)
+    )
+    moved = (raw != fine).any(-1)
+    for line in (moved[0], moved[-1], moved[:, 0], moved[:, 5], moved[:, 6], moved[:, -1]):
+        assert not line.any()
+    assert moved[3:-3, 3].any() and moved[3:-3, 8].any()
+
+
+def test_places_beside_a_tear_are_as_the_charts_say(plain_charts: Tensor) -> None:
+    iuv, _ = slope(12, 12)
+    iuv[0, 1, :, 6:] += 20  # 0.08 of the texture
+    ways = texture_coordinates, smooth_coordinates
+    raw, fine = (way(iuv, plain_charts)[0] for way in ways)
+    assert torch.equal(raw[:, 5:7], fine[:, 5:7])
+    assert not torch.equal(raw, fine)
 
 
 @pytest.mark.parametrize(

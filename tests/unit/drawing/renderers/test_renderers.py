@@ -10,7 +10,7 @@ import pytest
 from motion_transfer.drawing.engines import ENGINES, Wish
 from motion_transfer.drawing.renderers.interface import Renderer
 from motion_transfer.drawing.renderers.network import grow_mask, open_recipe
-from motion_transfer.drawing.renderers.texture import TextureRenderer, soften, tabulate_texture
+from motion_transfer.drawing.renderers.texture import TextureRecipe, soften
 from motion_transfer.drawing.source import Source
 from motion_transfer.render.options import SourceOptions
 from motion_transfer.render.source import read_source
@@ -24,8 +24,13 @@ def source(studio) -> Source:
 @pytest.fixture(params=["texture", *ENGINES])
 def renderer(request, source: Source, checkpoint: Path) -> Renderer:
     if request.param == "texture":
-        return TextureRenderer(tabulate_texture(source))
+        return draft(source)
     recipe = open_recipe(checkpoint, Wish(engine=request.param))
+    return recipe.renderer(recipe.appearance_of(source))
+
+
+def draft(source: Source) -> Renderer:
+    recipe = TextureRecipe()
     return recipe.renderer(recipe.appearance_of(source))
 
 
@@ -51,7 +56,7 @@ def test_a_renderer_repeats_itself(studio, renderer: Renderer) -> None:
 
 def test_the_texture_renderer_looks_colours_up(studio, source: Source) -> None:
     iuv = studio.iuv(0, 0, size=(96, 96))
-    rgba = TextureRenderer(tabulate_texture(source)).render(iuv[None])[0]
+    rgba = draft(source).render(iuv[None])[0]
     for part, colour in {2: (200, 40, 40), 9: (30, 60, 160), 23: (220, 180, 40)}.items():
         middle = np.median(rgba[iuv[..., 0] == part][:, :3], axis=0)
         np.testing.assert_allclose(middle, colour, atol=1)
