@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
@@ -19,6 +21,8 @@ CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up t
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 HEAD_RIM, HEAD_LEVELS = 0.08, 90  # of a head's size, the root of its area; of 255: by eye
 ARM_RIM, ARM_LEVELS = 0.1, 45  # likewise, of a hand's and its forearm's
+STRAY_LEVELS = 20  # likewise, of what has a hand's colour beside it
+TOUCHING = 1 / 3  # of the rim around an arm: there shadows that it casts go as well
 MOUTH_METRES = 0.38  # see `UVTables.position`: higher up hair grows on heads
 SOLID_ALPHA = 192  # of 255; less is mixed with the background
 GRABCUT_HEIGHT = 320  # px; the cut is made at that size, or it would take seconds
@@ -35,7 +39,7 @@ def trim(
         alpha: How much of each pixel is the person; None: its colours have to tell.
     """
     trimmed = trim_outline(rgb, iuv) if alpha is None else trim_to_alpha(iuv, alpha)
-    return trim_arms(rgb, trim_head(rgb, trimmed))
+    return trim_arms(rgb, trim_around_arms(rgb, trim_head(rgb, trimmed)))
 
 
 def trim_head(
@@ -58,6 +62,44 @@ def trim_arms(
         arm = np.isin(iuv[..., 0], parts)
         iuv = iuv * ~find_strange_rim(rgb, arm, ARM_RIM, ARM_LEVELS)[..., None]
     return iuv
+
+
+def trim_around_arms(
+    rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Take fingers that reach beyond a hand's IUV out of that of the clothes behind them."""
+    behind = (iuv[..., 0] > 0) & ~np.isin(iuv[..., 0], [*ARMS[0], *ARMS[1]])
+    for parts in ARMS:
+        arm = np.isin(iuv[..., 0], parts)
+        iuv = iuv * ~find_strays(rgb, arm, behind)[..., None]
+    return iuv
+
+
+def find_strays(
+    rgb: UInt8[np.ndarray, "H W 3"], arm: Bool[np.ndarray, "H W"], behind: Bool[np.ndarray, "H W"]
+) -> Bool[np.ndarray, "H W"]:
+    """Mark pixels around an arm, of what is behind it, that have its colour, or lie in its shadow.
+
+    The colours that are compared with are the nearest ones of the arm, and those farther away.
+    """
+    strays = np.zeros(arm.shape, bool)
+    reach = ARM_RIM * np.count_nonzero(arm) ** 0.5
+    left, top, wide, tall = cv2.boundingRect(arm.astype(np.uint8))
+    grown = math.ceil(2 * reach)
+    around = np.s_[
+        max(0, top - grown) : top + tall + grown, max(0, left - grown) : left + wide + grown
+    ]
+    arm, behind, rgb = arm[around], behind[around], rgb[around]
+    away = cv2.distanceTransform((~arm).astype(np.uint8), cv2.DIST_L2, 3)
+    doubted, sure = behind & (away <= reach), behind & (away > reach)
+    if doubted.any() and sure.any():
+        from_arm, from_sure = (
+            cv2.absdiff(rgb, take_nearest(rgb, ~known)).mean(2) for known in (arm, sure)
+        )
+        alike = (from_arm < from_sure) & (from_sure > STRAY_LEVELS)
+        shaded = (away <= reach * TOUCHING) & (from_sure > ARM_LEVELS)
+        strays[around] = doubted & (alike | shaded)
+    return strays
 
 
 def find_strange_rim(

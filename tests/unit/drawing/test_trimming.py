@@ -12,6 +12,7 @@ from motion_transfer.drawing.source import SourcePicture, unfold_picture
 from motion_transfer.drawing.trimming import (
     SOLID_ALPHA,
     trim_arms,
+    trim_around_arms,
     trim_head,
     trim_outline,
     trim_to_alpha,
@@ -88,6 +89,26 @@ def test_a_hand_before_trousers_keeps_none_of_them() -> None:
     assert (trimmed[:, :50] == iuv[:, :50, 0])[:, 33:47].all(), "the middle is never doubted"
     assert np.count_nonzero(trimmed[10:100, 30:50]) > 0.97 * 90 * 20, "sleeve and skin stay"
     assert (trimmed[60:100, 54:80] == thigh).all(), "and so do the trousers' own pixels"
+
+
+def test_fingers_beyond_a_hands_outline_are_no_clothes() -> None:
+    """The hand is 3 px wider than its IUV, and casts a shadow; a badge is just as far from it."""
+    trunk, hand = 2, 4
+    skin, cloth, shadow, badge = (200, 150, 120), (40, 60, 150), (5, 5, 20), (250, 240, 60)
+    iuv = np.full((120, 120, 3), (trunk, 99, 99), np.uint8)
+    iuv[40:80, 40:80, 0] = hand
+    photo = np.full((120, 120, 3), cloth, np.uint8)
+    photo[40:80, 37:83] = skin
+    photo[80:81, 37:83] = shadow
+    photo[30:37, 50:60] = badge
+    trimmed = trim_around_arms(photo, iuv)[..., 0]
+    fingers = np.zeros((120, 120), bool)
+    fingers[40:81, 37:83] = True
+    assert (trimmed[40:80, 40:80] == hand).all()
+    assert not trimmed[fingers & (iuv[..., 0] == trunk)].any()
+    assert (trimmed[~fingers] == trunk).all()
+    plain = trim_around_arms(np.full_like(photo, 70), iuv)
+    np.testing.assert_array_equal(plain, iuv)
 
 
 def test_alpha_says_where_the_person_ends(studio) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from estimate_stubs import iuv_logits
+from numpy.lib.stride_tricks import sliding_window_view
 from torch.nn import functional as F
 
 from motion_transfer.drawing.person import Box
@@ -28,12 +29,27 @@ def smooth_logits(seed: int) -> tuple[np.ndarray, np.ndarray]:
     return parts.astype(np.float32), uv.reshape(24, 2, 128, 128).astype(np.float32)
 
 
+def smoothed(parts: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """U and V, averaged over the largest of three squares that is all one part."""
+    likeliest, out = parts.argmax(0), uv.copy()
+    for reach in (1, 2, 3):
+        side, inner = (2 * reach + 1,) * 2, np.s_[reach:-reach, reach:-reach]
+        alone = sliding_window_view(likeliest, side) == likeliest[inner][..., None, None]
+        means = sliding_window_view(uv, side, axis=(2, 3)).mean((-2, -1))
+        for part in range(1, PARTS):
+            own = alone.all((-2, -1)) & (likeliest[inner] == part)
+            out[part - 1][:, *inner][:, own] = means[part - 1][:, own]
+    return out
+
+
 @pytest.mark.parametrize("size", [2, 90, 128, 413, FINEST])
 def test_it_is_what_enlarging_everything_gives(size: int) -> None:
     parts, uv = smooth_logits(size)
     window = Box(3, 5, 3 + size, 5 + size)
     painted = paint_iuv(parts, uv, window, window)
-    planes = torch.from_numpy(np.concatenate([parts, uv.reshape(48, 128, 128)]))[None].double()
+    logits = np.concatenate([parts, smoothed(parts, uv).reshape(48, 128, 128)])
+    assert not np.array_equal(logits[PARTS:], uv.reshape(48, 128, 128))
+    planes = torch.from_numpy(logits)[None].double()
     large = F.interpolate(planes, (size, size), mode="bilinear", align_corners=False)[0].numpy()
     which = large[:PARTS].argmax(0)
     assert (painted[..., 0] != which).mean() <= 1e-4  # where two are as high but for rounding
