@@ -83,8 +83,10 @@ def find_strays(
     The colours that are compared with are the nearest ones of the arm, and those farther away.
     """
     strays = np.zeros(arm.shape, bool)
-    reach = ARM_RIM * np.count_nonzero(arm) ** 0.5
     left, top, wide, tall = cv2.boundingRect(arm.astype(np.uint8))
+    if not wide:
+        return strays
+    reach = ARM_RIM * np.count_nonzero(arm) ** 0.5
     grown = math.ceil(2 * reach)
     around = np.s_[
         max(0, top - grown) : top + tall + grown, max(0, left - grown) : left + wide + grown

@@ -99,11 +99,11 @@ def test_fingers_beyond_a_hands_outline_are_no_clothes() -> None:
     iuv[40:80, 40:80, 0] = hand
     photo = np.full((120, 120, 3), cloth, np.uint8)
     photo[40:80, 37:83] = skin
-    photo[80:81, 37:83] = shadow
+    photo[80, 40:80] = shadow
     photo[30:37, 50:60] = badge
     trimmed = trim_around_arms(photo, iuv)[..., 0]
     fingers = np.zeros((120, 120), bool)
-    fingers[40:81, 37:83] = True
+    fingers[40:80, 37:83] = fingers[80, 40:80] = True
     assert (trimmed[40:80, 40:80] == hand).all()
     assert not trimmed[fingers & (iuv[..., 0] == trunk)].any()
     assert (trimmed[~fingers] == trunk).all()
