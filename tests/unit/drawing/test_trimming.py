@@ -100,7 +100,7 @@ def test_fingers_beyond_a_hands_outline_are_no_clothes() -> None:
     photo = np.full((120, 120, 3), cloth, np.uint8)
     photo[40:80, 37:83] = skin
     photo[80, 40:80] = shadow
-    photo[30:37, 50:60] = badge
+    photo[24:32, 50:60] = badge
     trimmed = trim_around_arms(photo, iuv)[..., 0]
     fingers = np.zeros((120, 120), bool)
     fingers[40:80, 37:83] = fingers[80, 40:80] = True
