@@ -11,13 +11,14 @@ from dataclasses import replace
 from motion_transfer.drawing.engines.around import continue_patterns
 from motion_transfer.drawing.engines.crotch import clothe_crotch
 from motion_transfer.drawing.engines.interface import FeatureMap, Guess
+from motion_transfer.drawing.engines.limbs import go_around_limbs
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import average, mirror_texture, shrink_texture
 from nhrr_core.config import COLOUR_CHANNELS
 
 Amendment = Callable[[Guess], None]
 
-AMENDMENTS: tuple[Amendment, ...] = (clothe_crotch, continue_patterns)
+AMENDMENTS: tuple[Amendment, ...] = (clothe_crotch, go_around_limbs, continue_patterns)
 """In this order: patterns go on where guesses have their ground's colour by then."""
 
 
