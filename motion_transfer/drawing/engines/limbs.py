@@ -62,7 +62,7 @@ def _average_along(
     """Average values along a limb, where it is wanted; and how many there are."""
     count, nearest = round(float(wanted.max())) + 1, np.rint(steps).astype(np.int64)
     rows = [np.bincount(nearest, each, count) for each in (*values, np.ones_like(steps))]
-    sums = cv2.GaussianBlur(np.float32(rows), (0, 0), SPREAD, sigmaY=1e-3)
+    sums = cv2.GaussianBlur(np.array(rows, np.float32), (0, 0), SPREAD, sigmaY=1e-3)
     *totals, counts = (np.interp(wanted, np.arange(count), row) for row in sums)
     return (np.stack(totals) / np.maximum(counts, 1e-3)).astype(np.float32), counts
 

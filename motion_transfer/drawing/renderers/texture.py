@@ -94,7 +94,7 @@ class TextureRenderer:
         x, y = smooth_coordinates(iuv[person]) * np.float32(TWIN_SIZE) - np.float32(0.5)
         border = cv2.BORDER_REPLICATE
         colours = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderMode=border)
-        body = cv2.compare(iuv[person][..., 0], 0, cv2.CMP_GT)
+        body = cv2.inRange(iuv[person][..., 0], 1, 255)
         opaque = cv2.cvtColor(colours, cv2.COLOR_RGB2RGBA)
         cv2.copyTo(opaque, body, picture[person])
         picture[..., 3] = soften(picture[..., 3])
