@@ -13,7 +13,7 @@ from motion_transfer.drawing.person import bounding_box, disc, occupancy
 from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
 from motion_transfer.drawing.views import HEAD
 from motion_transfer.media.nearest import take_nearest
-from nhrr_core import load_uv_tables
+from nhrr_core import PART_GROUPS, load_uv_tables
 
 ARMS = (3, 20, 22), (4, 19, 21)  # a hand and its forearm
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
@@ -67,8 +67,12 @@ def trim_arms(
 def trim_around_arms(
     rgb: UInt8[np.ndarray, "H W 3"], iuv: UInt8[np.ndarray, "H W 3"]
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """Take fingers that reach beyond a hand's IUV out of that of the clothes behind them."""
-    behind = (iuv[..., 0] > 0) & ~np.isin(iuv[..., 0], [*ARMS[0], *ARMS[1]])
+    """Take fingers that reach beyond a hand's IUV out of that of the clothes behind them.
+
+    Upper arms stay: below a short sleeve an elbow has the forearm's colour by right.
+    """
+    whole_arms = [*ARMS[0], *ARMS[1], *PART_GROUPS["upper-arms"]]
+    behind = (iuv[..., 0] > 0) & ~np.isin(iuv[..., 0], whole_arms)
     for parts in ARMS:
         arm = np.isin(iuv[..., 0], parts)
         iuv = iuv * ~find_strays(rgb, arm, behind)[..., None]

@@ -51,8 +51,9 @@ class TextureRecipe:
         pass
 
     def appearance_of(self, source: Source) -> Appearance:
-        completed = complete_texture(source.texture, source.visibility).transpose(1, 2, 0)
-        return np.rint((completed + 1) * 127.5).clip(0, 255).astype(np.uint8)
+        completed = complete_texture(source.texture, source.visibility)
+        levels = np.rint((completed + 1) * 127.5).clip(0, 255).astype(np.uint8)
+        return np.ascontiguousarray(levels.transpose(1, 2, 0))
 
     def renderer(self, appearance: Appearance) -> TextureRenderer:
         assert isinstance(appearance, np.ndarray)

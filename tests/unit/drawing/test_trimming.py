@@ -111,6 +111,14 @@ def test_fingers_beyond_a_hands_outline_are_no_clothes() -> None:
     np.testing.assert_array_equal(plain, iuv)
 
 
+def test_the_skin_between_a_sleeve_and_a_forearm_stays() -> None:
+    iuv = np.zeros((120, 60, 3), np.uint8)
+    iuv[10:50, 20:40, 0], iuv[50:110, 20:40, 0] = 18, 20  # an upper arm, its forearm
+    photo = np.full((120, 60, 3), (200, 150, 120), np.uint8)
+    photo[10:47] = 30, 30, 200  # the sleeve ends 3 px above the elbow
+    np.testing.assert_array_equal(trim_around_arms(photo, iuv), iuv)
+
+
 def test_alpha_says_where_the_person_ends(studio) -> None:
     """Backdrop and person in one colour: only alpha can tell; the solid part of it counts."""
     iuv = studio.iuv(scale=4, size=(384, 256))
