@@ -32,7 +32,7 @@ from nhrr_core.texture import (
     mirror_texture,
     shrink_texture,
 )
-from nhrr_core.uv_layout import load_uv_layout
+from nhrr_core.uv_layout import load_uv_layout, smooth_coordinates
 
 
 class NeuralReRenderer(nn.Module):
@@ -276,12 +276,13 @@ class NeuralReRenderer(nn.Module):
         """
         config = self.config
         looked_up, picture = feature_map.tensor_split([config.sampled_channels], dim=1)
-        features = sample_features(looked_up, target_iuv, self.charts)
+        places = smooth_coordinates(target_iuv, self.charts)
+        features = sample_features(looked_up, target_iuv, self.charts, places)
         scale = features.new_ones(len(features))
         if config.told_scale:
             scale = pixels_per_texel(target_iuv, self.charts)
         if detail is not None:
-            finer = sample_features(detail, target_iuv, self.charts)
+            finer = sample_features(detail, target_iuv, self.charts, places)
             share = detail_share(scale, detail.shape[-1])
             features[:, :COLOUR_CHANNELS] += finer * share[:, None, None, None]
         own, places = features, features[:, :0]

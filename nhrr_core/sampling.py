@@ -17,6 +17,7 @@ def sample_features(
     feature_map: Float[Tensor, "M D T T"],
     iuv: UInt8[Tensor, "B 3 H W"],
     charts: Float[Tensor, "24 256 256 2"],
+    places: Float[Tensor, "B H W 2"] | None = None,
 ) -> Float[Tensor, "B D H W"]:
     """Look up each pixel's feature in the UV feature map.
 
@@ -27,6 +28,7 @@ def sample_features(
         feature_map: One map per image, or a single one (M = 1) for the whole batch.
         iuv: The target's, (I, U, V).
         charts: The lookup table, `UVLayout.charts`.
+        places: What `smooth_coordinates` says, where several maps are looked up; None: it is asked.
     Returns: The feature image; exactly 0 where the part index is 0.
     Raises: ShapeError if the number of maps is neither 1 nor that of the images.
     Source: the paper, Sec. 3.3, Eq. 2. Departs from it: pixels lie between the levels of U and V.
@@ -34,10 +36,11 @@ def sample_features(
     maps, images = feature_map.shape[0], iuv.shape[0]
     if maps not in (1, images):
         raise ShapeError(f"{maps} feature maps for {images} IUV images; give 1 or {images}")
+    if places is None:
+        places = smooth_coordinates(iuv, charts)
     if iuv.device.type != "cpu":
-        return _sample_everywhere(feature_map, iuv, charts)
+        return _sample_everywhere(feature_map, iuv, places)
     image = feature_map.new_zeros(images, feature_map.shape[1], *iuv.shape[2:])
-    places = smooth_coordinates(iuv, charts)
     for number, own_map in enumerate(feature_map.split(1)):
         shown = slice(None) if maps == 1 else slice(number, number + 1)
         index, row, column = (iuv[shown, 0] > 0).nonzero(as_tuple=True)  # often a tenth of all
@@ -49,14 +52,13 @@ def sample_features(
 def _sample_everywhere(
     feature_map: Float[Tensor, "M D T T"],
     iuv: UInt8[Tensor, "B 3 H W"],
-    charts: Float[Tensor, "24 256 256 2"],
+    places: Float[Tensor, "B H W 2"],
 ) -> Float[Tensor, "B D H W"]:
     """Look up the background as well, then put 0 there.
 
     It is more work, but a device is not asked where the body is: nobody waits for its answer, and
     all that it does can be recorded as a CUDA graph.
     """
-    places = smooth_coordinates(iuv, charts)
     if len(feature_map) == len(places):
         sampled = _sample(feature_map, places)
     else:  # one map: images are looked up as one tall image, without a copy of the map for each

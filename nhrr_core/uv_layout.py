@@ -11,13 +11,7 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int64, UInt8
 from torch import Tensor
 
-from nhrr_core.uv_tables import (
-    CHART_SIZE,
-    MAX_SPREAD,
-    SMOOTHED_OVER,
-    WORD,
-    load_uv_tables,
-)
+from nhrr_core.uv_tables import CHART_SIZE, MAX_SPREAD, SMOOTHED_OVER, WORD, load_uv_tables
 
 
 @dataclass(frozen=True)

@@ -87,14 +87,10 @@ def find_strays(
     The colours that are compared with are the nearest ones of the arm, and those farther away.
     """
     strays = np.zeros(arm.shape, bool)
-    left, top, wide, tall = cv2.boundingRect(arm.astype(np.uint8))
-    if not wide:
+    if not arm.any():
         return strays
     reach = ARM_RIM * np.count_nonzero(arm) ** 0.5
-    grown = math.ceil(2 * reach)
-    around = np.s_[
-        max(0, top - grown) : top + tall + grown, max(0, left - grown) : left + wide + grown
-    ]
+    around = _cut_around(arm, math.ceil(2 * reach))
     arm, behind, rgb = arm[around], behind[around], rgb[around]
     away = cv2.distanceTransform((~arm).astype(np.uint8), cv2.DIST_L2, 3)
     doubted, sure = behind & (away <= reach), behind & (away > reach)
@@ -118,8 +114,7 @@ def find_strange_rim(
         levels: How far colours are apart then, the mean of their channels, of 255.
     """
     strange = np.zeros(part.shape, bool)
-    left, top, wide, tall = cv2.boundingRect(part.astype(np.uint8))
-    around = np.s_[max(0, top - 1) : top + tall + 1, max(0, left - 1) : left + wide + 1]
+    around = _cut_around(part, 1)
     part, rgb = part[around], rgb[around]
     depth = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 3)
     inner = part & (depth > width * np.count_nonzero(part) ** 0.5)
@@ -127,6 +122,14 @@ def find_strange_rim(
         apart = cv2.absdiff(rgb, take_nearest(rgb, ~inner)).mean(2)
         strange[around] = part & ~inner & (apart > levels)
     return strange
+
+
+def _cut_around(mask: Bool[np.ndarray, "H W"], margin: int) -> tuple[slice, slice]:
+    """Find the rows and columns that hold a mask and so many pixels around it."""
+    left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))
+    ends = (top, tall), (left, wide)
+    down, across = (slice(max(0, at - margin), at + long + margin) for at, long in ends)
+    return down, across
 
 
 def _heights(iuv: UInt8[np.ndarray, "N 3"]) -> Float32[np.ndarray, " N"]:

@@ -6,7 +6,6 @@ FeatureNet's guess of the other side may be smeared with what lies next to it in
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -70,16 +69,14 @@ def _average_along(
 @lru_cache(maxsize=2)
 def find_limbs(size: int) -> list[Limb]:
     """Find the arms and legs of a texture of that side."""
-    return list(_find(size))
-
-
-def _find(size: int) -> Iterator[Limb]:
     tables = load_uv_tables()
     part = pick_nearest(tables.part, size).reshape(-1)
     position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1)
+    found = []
     for axis, groups in LIMBS:
         own = np.isin(part, [each for group in groups for each in PART_GROUPS[group]])
         for side in (position[0] < 0, position[0] >= 0):
             texels = np.flatnonzero(own & side)
             along = np.abs(position[axis, texels])
-            yield Limb(texels, (along - along.min()) / np.float32(STEP_METRES))
+            found.append(Limb(texels, (along - along.min()) / np.float32(STEP_METRES)))
+    return found
