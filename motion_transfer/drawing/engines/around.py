@@ -8,29 +8,23 @@ seen, over and over: patterns go on, and nothing moves up or down, but across na
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float32, Int64
 
 from motion_transfer.drawing.engines.interface import Guess
-from motion_transfer.drawing.textures import fall, pick_nearest
+from motion_transfer.drawing.textures import fall
+from motion_transfer.drawing.tubes import CELL_METRES, unroll_body
 from nhrr_core import load_uv_tables
 
 SURROUNDINGS_METRES = 0.03  # of a texel: what a pattern stands out from
 PLAIN, PATTERNED = 0.15, 0.25  # RMS of that, of colours in [-1, 1]: folds and shadows; prints, lace
 ALIKE, APART = 0.1, 0.25  # colours of the ground that a pattern is copied from, and of the guess
 
-CELL_METRES = 0.005  # about a texel of the layout
 DOUBTED_METRES = 0.01  # from the edge of what is seen: there IUV often has another part's pixels
 LEAST_RUN = 4  # cells seen side by side; fewer tell no pattern
-STEEP = 3  # a cell without a texel takes one beside it rather than one above or below
 GAP_METRES = 0.04  # rows may lie so far from seen ones: seams between parts of the body
 LEAST_SHARE = 0.15  # of the way around has to be seen
-TORSO, THIGHS = (1, 2), ((7, 9), (8, 10))  # sleeves are too narrow: their edges are all they show
-SHOULDER_METRES = 0.2  # above the layout's origin a torso is no tube any more
 
 
 def continue_patterns(guess: Guess) -> None:
@@ -132,53 +126,3 @@ def _mirror_to_the_left(
     step = np.maximum(away - 1, 0) % (2 * length)
     step = np.minimum(step, 2 * length - 1 - step)
     return np.where(end < 0, 2 * len(column), away), end - step
-
-
-@dataclass(frozen=True)
-class Tube:
-    """A torso or thigh, unrolled: each row a way around it.
-
-    Attributes:
-        cells: The texel that is nearest to each cell, H x A; columns go around.
-        texels: Those of the tube.
-        rows, columns: The cells that they lie in.
-    """
-
-    cells: Int64[np.ndarray, "H A"]
-    texels: Int64[np.ndarray, " N"]
-    rows: Int64[np.ndarray, " N"]
-    columns: Int64[np.ndarray, " N"]
-
-
-@lru_cache(maxsize=2)
-def unroll_body(size: int) -> list[Tube]:
-    """Unroll torso and thighs of a texture of that side."""
-    tables = load_uv_tables()
-    part = pick_nearest(tables.part, size).reshape(-1)
-    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1)
-    torso = np.isin(part, TORSO) & (position[1] < SHOULDER_METRES)
-    thighs = [np.isin(part, parts) for parts in THIGHS]
-    return [_unroll(np.flatnonzero(own), position) for own in (torso, *thighs)]
-
-
-def _unroll(texels: Int64[np.ndarray, " N"], position: Float32[np.ndarray, "3 M"]) -> Tube:
-    x, y, z = position[:, texels]
-    rows = ((y - y.min()) / CELL_METRES).astype(np.int64)
-    across = np.stack([x, z])
-    low, high = (np.full((2, rows.max() + 1), sign * np.inf) for sign in (1, -1))
-    np.minimum.at(low.T, rows, across.T)
-    np.maximum.at(high.T, rows, across.T)
-    sides = across - (low[:, rows] + high[:, rows]) / 2
-    width = round(2 * np.pi * float(np.median(np.hypot(*sides))) / CELL_METRES)
-    columns = (np.arctan2(*sides) / (2 * np.pi) % 1 * width).astype(np.int64) % width
-    cells = np.full((len(low.T), width), -1)
-    cells[rows, columns] = texels
-    around = np.tile(np.repeat(cells, STEEP, axis=0), 3)
-    empty = (around < 0).astype(np.uint8)
-    of_a_pixel = cv2.DIST_LABEL_PIXEL
-    _, labels = cv2.distanceTransformWithLabels(empty, cv2.DIST_L2, 5, labelType=of_a_pixel)
-    label = labels.astype(np.int64)
-    named = np.zeros(label.max() + 1, np.int64)
-    named[label[empty == 0]] = around[empty == 0]
-    nearest = named[label][STEEP // 2 :: STEEP, width : 2 * width]
-    return Tube(nearest, texels, rows, columns)

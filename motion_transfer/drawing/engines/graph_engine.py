@@ -14,7 +14,7 @@ import onnx
 from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.engines import Execution
-from motion_transfer.drawing.engines.guesses import amend_guesses
+from motion_transfer.drawing.engines.guesses import encode_amended
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.lookup import FeatureRows
 from motion_transfer.drawing.engines.outline import signed_distance
@@ -90,14 +90,16 @@ class GraphEngine(ABC):
             from motion_transfer.drawing.engines.torch_engine import encode_source
 
             return encode_source(load_checkpoint(self._weights), source)
+        return encode_amended(source, self._encode)
+
+    def _encode(self, source: Source) -> FeatureMap:
         clearance = source.clearance
         if clearance is None:
             clearance = np.zeros((CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32)
         named = {TEXTURE: source.texture, VISIBILITY: source.visibility, CLEARANCE: clearance}
         inputs = {name: np.ascontiguousarray(array[None]) for name, array in named.items()}
         outputs = self._encoder.run_all(inputs)
-        found = FeatureMap(outputs[FEATURE_MAP], outputs.get(DETAIL))
-        return amend_guesses(found, source)
+        return FeatureMap(outputs[FEATURE_MAP], outputs.get(DETAIL))
 
     def prepare(self, sides: Collection[int]) -> None:
         for side in sides:

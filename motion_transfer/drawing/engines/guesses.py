@@ -1,6 +1,6 @@
 """What FeatureNet guesses of hidden places, amended by what a source shows near them.
 
-Departs from the paper, which draws what FeatureNet guesses.
+Departs from the paper, which draws what FeatureNet guesses of the photo alone.
 """
 
 from __future__ import annotations
@@ -8,22 +8,36 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from motion_transfer.drawing.backs import clothe_back
 from motion_transfer.drawing.engines.around import continue_patterns
 from motion_transfer.drawing.engines.crotch import clothe_crotch
 from motion_transfer.drawing.engines.interface import FeatureMap, Guess
 from motion_transfer.drawing.engines.limbs import go_around_limbs
+from motion_transfer.drawing.engines.seam import join_halves
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import average, mirror_texture, shrink_texture
 from nhrr_core.config import COLOUR_CHANNELS
 
 Amendment = Callable[[Guess], None]
 
-AMENDMENTS: tuple[Amendment, ...] = (clothe_crotch, go_around_limbs, continue_patterns)
-"""In this order: patterns go on where guesses have their ground's colour by then."""
+BY_PLACE: tuple[Amendment, ...] = (clothe_crotch, go_around_limbs, join_halves)
+"""Patterns go on after these, where guesses have their ground's colour by then."""
+
+
+def encode_amended(source: Source, encode: Callable[[Source], FeatureMap]) -> FeatureMap:
+    """Encode a source, told what it wears behind, and amend what is guessed of it.
+
+    Args:
+        encode: A network's.
+    """
+    worn = clothe_back(source)
+    feature_map = amend_guesses(encode(worn), worn, BY_PLACE)
+    # on what was painted for the network, patterns that photos show go on as elsewhere
+    return amend_guesses(feature_map, source, [continue_patterns])
 
 
 def amend_guesses(
-    feature_map: FeatureMap, source: Source, amendments: Sequence[Amendment] = AMENDMENTS
+    feature_map: FeatureMap, source: Source, amendments: Sequence[Amendment]
 ) -> FeatureMap:
     """Amend the colours that a network guesses.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Collection
 from copy import deepcopy
+from functools import partial
 from pathlib import Path
 from queue import Queue
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from motion_transfer.drawing.engines import Execution
-from motion_transfer.drawing.engines.guesses import amend_guesses
+from motion_transfer.drawing.engines.guesses import encode_amended
 from motion_transfer.drawing.engines.interface import KEPT_SIZES, LANES, FeatureMap, Occupied
 from motion_transfer.drawing.engines.threads import one_torch_thread
 from motion_transfer.drawing.source import Source, cut_source
@@ -217,9 +218,16 @@ def choose_batch(config: ModelConfig, side: int, free_bytes: int) -> int:
 def encode_source(model: NeuralReRenderer, source: Source) -> FeatureMap:
     """Compute a source's feature map, where the model lies.
 
+    Raises: InputError if the model reads photos, and the source does not hold them.
+    """
+    return encode_amended(source, partial(_encode, model))
+
+
+def _encode(model: NeuralReRenderer, source: Source) -> FeatureMap:
+    """Compute what the model alone knows of a source.
+
     Measured: FeatureNet's last bits depend on the number of threads, so it gets one, wherever it
     runs; RenderNet's do not.
-    Raises: InputError if the model reads photos, and the source does not hold them.
     """
     device = next(model.parameters()).device
     known = (source.texture, source.visibility, source.clearance)
@@ -232,8 +240,7 @@ def encode_source(model: NeuralReRenderer, source: Source) -> FeatureMap:
         shown = None if pictures is None else torch.from_numpy(pictures)[None].to(device)
         features = model.encode_texture(texture, visibility, clearance, shown).cpu().numpy()
         detail = model.detail(texture, visibility)
-        found = FeatureMap(features, None if detail is None else detail.cpu().numpy())
-    return amend_guesses(found, source)
+        return FeatureMap(features, None if detail is None else detail.cpu().numpy())
 
 
 def cut_pictures(source: Source, config: ModelConfig) -> UInt8[np.ndarray, "P 6 S S"] | None:

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
+from motion_transfer.drawing.backs import clothe_back
 from motion_transfer.drawing.engines.interface import Occupied
 from motion_transfer.drawing.renderers.interface import Appearance
 from motion_transfer.drawing.source import Source
@@ -51,7 +52,8 @@ class TextureRecipe:
         pass
 
     def appearance_of(self, source: Source) -> Appearance:
-        completed = complete_texture(source.texture, source.visibility)
+        worn = clothe_back(source)
+        completed = complete_texture(worn.texture, worn.visibility)
         levels = np.rint((completed + 1) * 127.5).clip(0, 255).astype(np.uint8)
         return np.ascontiguousarray(levels.transpose(1, 2, 0))
 
