@@ -8,7 +8,6 @@ alike, the back gets their colour before the source is encoded.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -16,8 +15,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float32, Int64
 
-from motion_transfer.drawing.source import Source
-from motion_transfer.drawing.textures import average, pick_nearest
+from motion_transfer.drawing.source import Source, paint
+from motion_transfer.drawing.textures import average
 from motion_transfer.drawing.tubes import CELL_METRES, TORSO, go_around
 from nhrr_core import load_uv_tables
 
@@ -193,19 +192,11 @@ def _paint(
     rows: Marked,
 ) -> Source:
     """Colour the hidden back in those rows, from one flank's colour over to the other's."""
-    torso, size = find_torso(), source.texture.shape[-1]
+    torso = find_torso()
     here = rows[torso.rows] & torso.back
     texels, row = torso.texels[here], torso.rows[here]
     share = torso.turns[here] * 2 - 0.5  # of the right flank's
-    paint, painted = np.zeros((3, SIZE**2), np.float32), np.zeros(SIZE**2, bool)
-    paint[:, texels] = (left[:, row] * (1 - share) + right[:, row] * share) * 2 - 1
-    painted[texels] = True
-    paint, painted = (
-        pick_nearest(each.reshape(*each.shape[:-1], SIZE, SIZE), size) for each in (paint, painted)
-    )
-    painted &= source.visibility[0] == 0
-    return replace(
-        source,
-        texture=np.where(painted, paint, source.texture),
-        visibility=np.maximum(source.visibility, painted),
-    )
+    colours, painted = np.zeros((3, SIZE, SIZE), np.float32), np.zeros((SIZE, SIZE), bool)
+    colours.reshape(3, -1)[:, texels] = (left[:, row] * (1 - share) + right[:, row] * share) * 2 - 1
+    painted.reshape(-1)[texels] = True
+    return paint(source, colours, painted)

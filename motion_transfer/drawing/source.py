@@ -118,6 +118,29 @@ def unfold_source(
     )
 
 
+def paint(
+    source: Source,
+    colours: Float32[np.ndarray, "3 t t"],
+    where: Bool[np.ndarray, "t t"],
+    *,
+    over: bool = False,
+) -> Source:
+    """Show colours, in [-1, 1], in a source's texture as if a photo had.
+
+    Args:
+        over: Whether that covers what photos do show there.
+    """
+    size = source.texture.shape[-1]
+    painted = pick_nearest(where, size)
+    if not over:
+        painted = painted & (source.visibility[0] == 0)
+    return replace(
+        source,
+        texture=np.where(painted, pick_nearest(colours, size), source.texture),
+        visibility=np.maximum(source.visibility, painted),
+    )
+
+
 def undress(source: Source, parts: Collection[int]) -> Source:
     """Take parts of the body out of a source, so that another photo can give them.
 

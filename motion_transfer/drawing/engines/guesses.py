@@ -14,6 +14,7 @@ from motion_transfer.drawing.engines.crotch import clothe_crotch
 from motion_transfer.drawing.engines.interface import FeatureMap, Guess
 from motion_transfer.drawing.engines.limbs import go_around_limbs
 from motion_transfer.drawing.engines.seam import join_halves
+from motion_transfer.drawing.hair import lay_hair
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import average, mirror_texture, shrink_texture
 from nhrr_core.config import COLOUR_CHANNELS
@@ -25,12 +26,12 @@ BY_PLACE: tuple[Amendment, ...] = (clothe_crotch, go_around_limbs, join_halves)
 
 
 def encode_amended(source: Source, encode: Callable[[Source], FeatureMap]) -> FeatureMap:
-    """Encode a source, told what it wears behind, and amend what is guessed of it.
+    """Encode a source, told what it wears behind and how long its hair is, and amend the guesses.
 
     Args:
         encode: A network's.
     """
-    worn = clothe_back(source)
+    worn = lay_hair(clothe_back(source))
     feature_map = amend_guesses(encode(worn), worn, BY_PLACE)
     # on what was painted for the network, patterns that photos show go on as elsewhere
     return amend_guesses(feature_map, source, [continue_patterns])
