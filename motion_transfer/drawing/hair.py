@@ -16,9 +16,8 @@ from jaxtyping import Bool, Float32, Int64
 
 from motion_transfer.drawing.person import COVERS, bounding_box, occupancy
 from motion_transfer.drawing.source import Source, paint
-from motion_transfer.drawing.textures import average
 from motion_transfer.drawing.unfolding import keep_parts, texel_index, texture_coordinates
-from motion_transfer.media.nearest import nearest_pixels, nearest_points
+from motion_transfer.media.nearest import nearest_pixels
 from nhrr_core import PART_GROUPS, load_uv_tables
 
 SIZE = 256  # texels a side, those of the tables
@@ -37,7 +36,6 @@ MOSTLY = 0.6  # of the pixels of a row
 SPREAD = 2.5  # rows: the standard deviation of a Gaussian over which colours are averaged
 
 BEHIND_METRES = 0.02  # forward: what is hidden farther in front is not behind hair
-EDGE_METRES = 0.012  # from the outline that hair begins at: the photo shows skin and hair there
 MIDDLE_METRES = 0.05  # from the nape, where hair of both sides meets
 
 
@@ -54,15 +52,13 @@ def lay_hair(source: Source) -> Source:
     neck = find_neck()
     colours = _average(strands, hangs)
     own, others = (colours[:, side, neck.row] for side in (neck.side, 1 - neck.side))
-    hidden = average(source.visibility, SIZE).reshape(-1)[neck.texels] == 0
-    hidden &= neck.position[:, 2] < BEHIND_METRES
+    behind = neck.position[:, 2] < BEHIND_METRES
     covered = hangs[neck.side, neck.row] & (hangs.all(0)[neck.row] | (neck.off == 1))
-    here = covered & (hidden | _lies_beside(neck, strands))
     painted = np.zeros((SIZE, SIZE), bool)
-    painted.reshape(-1)[neck.texels[here]] = True
+    painted.reshape(-1)[neck.texels[covered & behind]] = True
     hair = np.zeros((3, SIZE, SIZE), np.float32)
     hair.reshape(3, -1)[:, neck.texels] = (own + (others - own) * (1 - neck.off) / 2) * 2 - 1
-    return paint(source, hair, painted, over=True)
+    return paint(source, hair, painted)
 
 
 class Neck(NamedTuple):
@@ -104,14 +100,12 @@ class Strands(NamedTuple):
 
     Attributes:
         rgb: Of each, 0 to 1.
-        texel: That of the body's outline next to it, in a texture of SIZE.
-        row, side: Where that lies, see `Neck`.
+        row, side: Where the body's outline next to it lies, see `Neck`.
         off: How far it is from the outline, metres.
         alike: Which have the colour of the hair beside the ears.
     """
 
     rgb: Float32[np.ndarray, "N 3"]
-    texel: Int64[np.ndarray, " N"]
     row: Int64[np.ndarray, " N"]
     side: Int64[np.ndarray, " N"]
     off: Float32[np.ndarray, " N"]
@@ -147,7 +141,7 @@ def _look_for_strands(source: Source) -> Strands | None:
     alike = np.abs(rgb - light[:, None] * hair).max(1) < SAME_HAIR
     off = away[beyond][own] * np.float32(HEAD_METRES / box.height)
     side = (position[:, 0] > 0).astype(np.int64)
-    return Strands(rgb, texel[own], _row(position), side, off, alike)
+    return Strands(rgb, _row(position), side, off, alike)
 
 
 def _measure_length(strands: Strands) -> Bool[np.ndarray, "2 R"] | None:
@@ -185,17 +179,6 @@ def _average(strands: Strands, hangs: Bool[np.ndarray, "2 R"]) -> Float32[np.nda
     spread += spread.sum(1, keepdims=True) * np.float32(1e-3)
     spread += spread.sum(2, keepdims=True) * np.float32(1e-6)
     return spread[:3] / spread[3:]
-
-
-def _lies_beside(neck: Neck, strands: Strands) -> Bool[np.ndarray, " N"]:
-    """Tell which texels of the neck lie at the outline that hair begins at."""
-    position = load_uv_tables().position.reshape(-1, 3)
-    outline = np.unique(strands.texel[strands.alike])
-    outline = outline[position[outline, 1] < JAW]
-    if not len(outline):
-        return np.zeros(len(neck.texels), bool)
-    away, _ = nearest_points(position[outline], neck.position, 1)
-    return (neck.position[:, 1] < JAW) & (away[:, 0] < EDGE_METRES)
 
 
 def _row(position: Float32[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:

@@ -119,21 +119,11 @@ def unfold_source(
 
 
 def paint(
-    source: Source,
-    colours: Float32[np.ndarray, "3 t t"],
-    where: Bool[np.ndarray, "t t"],
-    *,
-    over: bool = False,
+    source: Source, colours: Float32[np.ndarray, "3 t t"], where: Bool[np.ndarray, "t t"]
 ) -> Source:
-    """Show colours, in [-1, 1], in a source's texture as if a photo had.
-
-    Args:
-        over: Whether that covers what photos do show there.
-    """
+    """Show colours, in [-1, 1], where a source's texture is hidden, as if a photo had."""
     size = source.texture.shape[-1]
-    painted = pick_nearest(where, size)
-    if not over:
-        painted = painted & (source.visibility[0] == 0)
+    painted = pick_nearest(where, size) & (source.visibility[0] == 0)
     return replace(
         source,
         texture=np.where(painted, pick_nearest(colours, size), source.texture),

@@ -25,9 +25,9 @@ def join_halves(guess: Guess) -> None:
     """Bring both halves of what is hidden behind to one colour where they meet."""
     texels, others, nearness = _find_cut(len(guess.shown))
     colours, hidden = guess.colours.reshape(3, -1), guess.hidden.reshape(-1)
-    # half-way if both are guessed; if the other one is seen, all the way
-    share = hidden[texels] / np.maximum(hidden[texels] + hidden[others], np.float32(1e-3))
-    share *= hidden[texels] > 0
+    own, other = hidden[texels], hidden[others]
+    # half-way if both are guessed; all the way to what is seen; of what is half seen, half
+    share = own * own / np.maximum(own + other, np.float32(1e-3))
     colours[:, texels] += (colours[:, others] - colours[:, texels]) * share * nearness
 
 
