@@ -53,7 +53,8 @@ def lay_hair(source: Source) -> Source:
     colours = _average(strands, hangs)
     own, others = (colours[:, side, neck.row] for side in (neck.side, 1 - neck.side))
     behind = neck.position[:, 2] < BEHIND_METRES
-    covered = hangs[neck.side, neck.row] & (hangs.all(0)[neck.row] | (neck.off == 1))
+    both = hangs[0] & hangs[1]
+    covered = hangs[neck.side, neck.row] & (both[neck.row] | (neck.off == 1))
     painted = np.zeros((SIZE, SIZE), bool)
     painted.reshape(-1)[neck.texels[covered & behind]] = True
     hair = np.zeros((3, SIZE, SIZE), np.float32)

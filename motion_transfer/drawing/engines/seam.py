@@ -44,7 +44,7 @@ def _find_cut(
     texels = np.flatnonzero(nearness)
     right = texels % size < MIDDLE * size
     halves = texels[right], texels[~right]
-    mirrored = position.T * np.float32([-1, 1, 1])
+    mirrored = position.T * np.array([-1, 1, 1], np.float32)
     # not `side_twin`, which beside the cut may be the texel itself
     others = [
         opposite[nearest_points(position.T[opposite], mirrored[own], 1)[1][:, 0]]
