@@ -13,6 +13,7 @@ from motion_transfer.drawing.engines.around import continue_patterns
 from motion_transfer.drawing.engines.crotch import clothe_crotch
 from motion_transfer.drawing.engines.interface import FeatureMap, Guess
 from motion_transfer.drawing.engines.limbs import go_around_limbs
+from motion_transfer.drawing.engines.neck import close_neck
 from motion_transfer.drawing.engines.seam import join_halves
 from motion_transfer.drawing.hair import lay_hair
 from motion_transfer.drawing.source import Source
@@ -21,7 +22,12 @@ from nhrr_core.config import COLOUR_CHANNELS
 
 Amendment = Callable[[Guess], None]
 
-BY_PLACE: tuple[Amendment, ...] = (clothe_crotch, go_around_limbs, join_halves)
+BY_PLACE: tuple[Amendment, ...] = (
+    clothe_crotch,
+    go_around_limbs,
+    join_halves,
+    close_neck,
+)
 """Patterns go on after these, where guesses have their ground's colour by then."""
 
 
