@@ -138,7 +138,7 @@ def _look_for_strands(source: Source) -> Strands | None:
     if np.count_nonzero(by_the_ears) < FEWEST_PIXELS:
         return None
     hair = np.median(rgb[by_the_ears], axis=0)
-    light = (rgb @ hair / (hair @ hair)).clip(*SHADES)
+    light = (rgb @ hair / max(hair @ hair, np.float32(1e-4))).clip(*SHADES)  # black ones, too
     alike = np.abs(rgb - light[:, None] * hair).max(1) < SAME_HAIR
     off = away[beyond][own] * np.float32(HEAD_METRES / box.height)
     side = (position[:, 0] > 0).astype(np.int64)

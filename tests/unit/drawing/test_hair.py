@@ -65,12 +65,13 @@ def portrait(lowest: float, colour: tuple[int, int, int] = HAIR, width: int = 12
     return Source(photo, IUV, None, (skin * seen).astype(np.float32), seen)
 
 
-def test_hair_down_to_the_shoulders_covers_the_neck_behind() -> None:
-    source = portrait(0.26)
+@pytest.mark.parametrize("colour", [HAIR, (0, 0, 0)], ids=["brown", "black"])
+def test_hair_down_to_the_shoulders_covers_the_neck_behind(colour: tuple[int, int, int]) -> None:
+    source = portrait(0.26, colour)
     worn = lay_hair(source)
     behind = NAPE & (HEIGHT > LOWEST + 0.02) & (HEIGHT < HIGHEST - 0.01)
     assert worn.visibility[0, behind].mean() > 0.98
-    hair = (np.array(HAIR) / 127.5 - 1)[:, None]
+    hair = (np.array(colour) / 127.5 - 1)[:, None]
     assert np.abs(worn.texture[:, behind & (worn.visibility[0] > 0)] - hair).max() < 0.02
     face = np.zeros((SIZE, SIZE), bool)
     face.reshape(-1)[NECK.texels[(NECK.position[:, 2] > 0.02) & (NECK.position[:, 1] > JAW)]] = True
