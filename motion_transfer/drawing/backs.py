@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int64
 
 from motion_transfer.drawing.source import Source, paint
-from motion_transfer.drawing.textures import average
+from motion_transfer.drawing.textures import average, differ_in_any_light
 from motion_transfer.drawing.tubes import CELL_METRES, TORSO, go_around
 from nhrr_core import load_uv_tables
 
@@ -53,18 +53,20 @@ def clothe_back(source: Source) -> Source:
     who wants to know what photos show asks the source that was given.
     """
     torso = find_torso()
-    colours, told = _average(source, torso)
+    share = average(source.visibility, SIZE).reshape(-1)[torso.texels]
+    colours, told = _average(source, share, torso)
     known = np.all([told[each].sum(0) >= FEWEST_SECTORS for each in FLANKS], axis=0)
     if not known.any():
         return source
     flanks = [_look_at_flank(colours[each], told[each], known) for each in FLANKS]
     left, right = (flank.colours for flank in flanks)
     cloth = (left + right) / 2
-    apart = _differ(left, right, ITS_SHADES)
-    alike = (apart < ALIKE) & ~_is_back_seen(source, torso)
+    apart = differ_in_any_light(left, right, ITS_SHADES)
+    alike = (apart < ALIKE) & ~_is_back_seen(share, torso)
     variety = np.maximum(apart, np.mean([flank.variety for flank in flanks], axis=0))
-    middle = np.stack([_differ(each, cloth, SHADES) for each in colours[MIDDLE]]) * told[MIDDLE]
-    opened = known & alike & (middle.max(0) > OTHER + VARIETY * variety)
+    middle = [differ_in_any_light(each, cloth, SHADES) for each in colours[MIDDLE]]
+    stands_out = (np.stack(middle) * told[MIDDLE]).max(0)
+    opened = known & alike & (stands_out > OTHER + VARIETY * variety)
     rows = _find_open_rows(cloth, alike, opened)
     return _paint(source, _blur(left, SOFT), _blur(right, SOFT), rows) if rows.any() else source
 
@@ -106,10 +108,13 @@ def find_torso() -> Torso:
 
 
 def _average(
-    source: Source, torso: Torso
+    source: Source, share: Float32[np.ndarray, " N"], torso: Torso
 ) -> tuple[Float32[np.ndarray, "S 3 H"], Bool[np.ndarray, "S H"]]:
-    """Average what is seen, 0 to 1, of each sector of each row; and tell where that is anything."""
-    share = average(source.visibility, SIZE).reshape(-1)[torso.texels]
+    """Average what is seen, 0 to 1, of each sector of each row; and tell where that is anything.
+
+    Args:
+        share: How much of each of the torso's texels is seen.
+    """
     colours = average(source.texture, SIZE).reshape(3, -1)[:, torso.texels]
     seen = share > SEEN_SHARE
     height = int(torso.rows.max()) + 1
@@ -122,9 +127,8 @@ def _average(
     return means, count >= FEWEST_TEXELS
 
 
-def _is_back_seen(source: Source, torso: Torso) -> Marked:
+def _is_back_seen(share: Float32[np.ndarray, " N"], torso: Torso) -> Marked:
     """Tell where so much of the back is seen that it tells for itself."""
-    share = average(source.visibility, SIZE).reshape(-1)[torso.texels]
     seen, there = (np.bincount(torso.rows, each * torso.back) for each in (share, share**0))
     return _blur(seen, SPREAD) > BACK_SEEN * _blur(there, SPREAD)
 
@@ -137,16 +141,8 @@ def _look_at_flank(
     nearest = where[np.abs(np.arange(len(known))[:, None] - where).argmin(1)]
     shown = np.where(told[:, None], colours, np.nan)[..., nearest]
     own = np.nanmedian(shown, axis=0)
-    apart = np.stack([_differ(each, own, ITS_SHADES) for each in shown])
+    apart = np.stack([differ_in_any_light(each, own, ITS_SHADES) for each in shown])
     return Flank(own, _blur(np.nanmean(apart, axis=0), SPREAD))
-
-
-def _differ(
-    colours: Float32[np.ndarray, "3 H"], of: Float32[np.ndarray, "3 H"], shades: tuple[float, float]
-) -> Float32[np.ndarray, " H"]:
-    """Tell how far colours are from others in the light that makes them most alike."""
-    light = (colours * of).sum(0) / np.maximum((of * of).sum(0), np.float32(1e-4))
-    return np.abs(colours - of * light.clip(*shades)).max(0)
 
 
 def _find_open_rows(cloth: Float32[np.ndarray, "3 H"], alike: Marked, opened: Marked) -> Marked:
@@ -158,7 +154,7 @@ def _find_open_rows(cloth: Float32[np.ndarray, "3 H"], alike: Marked, opened: Ma
         return np.zeros_like(opened)
     opened = np.any(openings, axis=0)
     own = np.median(cloth[:, opened], axis=1, keepdims=True)
-    same = alike & (_differ(cloth, own, ITS_SHADES) < SAME_CLOTH)
+    same = alike & (differ_in_any_light(cloth, own, ITS_SHADES) < SAME_CLOTH)
     rows = np.zeros_like(opened)
     margin = round(MARGIN_METRES / CELL_METRES)
     for garment in _list_runs(same):

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float32, Int64
 
 from motion_transfer.drawing.person import COVERS, bounding_box, occupancy
 from motion_transfer.drawing.source import Source, paint
+from motion_transfer.drawing.textures import differ_in_any_light
 from motion_transfer.drawing.unfolding import keep_parts, texel_index, texture_coordinates
 from motion_transfer.media.nearest import nearest_pixels
 from nhrr_core import PART_GROUPS, load_uv_tables
@@ -138,8 +139,7 @@ def _look_for_strands(source: Source) -> Strands | None:
     if np.count_nonzero(by_the_ears) < FEWEST_PIXELS:
         return None
     hair = np.median(rgb[by_the_ears], axis=0)
-    light = (rgb @ hair / max(hair @ hair, np.float32(1e-4))).clip(*SHADES)  # black ones, too
-    alike = np.abs(rgb - light[:, None] * hair).max(1) < SAME_HAIR
+    alike = differ_in_any_light(rgb.T, hair[:, None], SHADES) < SAME_HAIR
     off = away[beyond][own] * np.float32(HEAD_METRES / box.height)
     side = (position[:, 0] > 0).astype(np.int64)
     return Strands(rgb, _row(position), side, off, alike)

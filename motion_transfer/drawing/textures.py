@@ -85,6 +85,22 @@ def pick_nearest(values: Shaped[np.ndarray, "*C t t"], size: int) -> Shaped[np.n
     return values[..., at[:, None], at]
 
 
+def differ_in_any_light(
+    colours: Float32[np.ndarray, "3 N"],
+    of: Float32[np.ndarray, (3 #N
+)],
+    shades: tuple[float, float],
+) -> Float32[np.ndarray, " N"]:
+    """Tell how far colours are from others, 0 to 1, in the light that makes them most alike.
+
+    Args:
+        shades: The least and the most light, in that of the colours themselves.
+    Returns: The difference in the channel that differs most.
+    """
+    light = (colours * of).sum(0) / np.maximum((of * of).sum(0), np.float32(1e-4))
+    return np.abs(colours - of * light.clip(*shades)).max(0)
+
+
 def fall(values: Float32[np.ndarray, "*S"], first: float, last: float) -> Float32[np.ndarray, "*S"]:
     """Fall from 1 to 0 between two values."""
     return ((last - values) / (last - first)).clip(0, 1)

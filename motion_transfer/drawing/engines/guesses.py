@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from motion_transfer.drawing.backs import clothe_back
 from motion_transfer.drawing.engines.around import continue_patterns
 from motion_transfer.drawing.engines.crotch import clothe_crotch
 from motion_transfer.drawing.engines.interface import FeatureMap, Guess
 from motion_transfer.drawing.engines.limbs import go_around_limbs
 from motion_transfer.drawing.engines.neck import close_neck
 from motion_transfer.drawing.engines.seam import join_halves
-from motion_transfer.drawing.hair import lay_hair
+from motion_transfer.drawing.hidden import show_hidden
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import average, mirror_texture, shrink_texture
 from nhrr_core.config import COLOUR_CHANNELS
@@ -37,7 +36,7 @@ def encode_amended(source: Source, encode: Callable[[Source], FeatureMap]) -> Fe
     Args:
         encode: A network's.
     """
-    worn = lay_hair(clothe_back(source))
+    worn = show_hidden(source)
     feature_map = amend_guesses(encode(worn), worn, BY_PLACE)
     # on what was painted for the network, patterns that photos show go on as elsewhere
     return amend_guesses(feature_map, source, [continue_patterns])

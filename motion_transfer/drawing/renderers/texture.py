@@ -14,9 +14,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
-from motion_transfer.drawing.backs import clothe_back
 from motion_transfer.drawing.engines.interface import Occupied
-from motion_transfer.drawing.hair import lay_hair
+from motion_transfer.drawing.hidden import show_hidden
 from motion_transfer.drawing.renderers.interface import Appearance
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.textures import mirror_texture, pick_nearest
@@ -53,7 +52,7 @@ class TextureRecipe:
         pass
 
     def appearance_of(self, source: Source) -> Appearance:
-        worn = lay_hair(clothe_back(source))
+        worn = show_hidden(source)
         completed = complete_texture(worn.texture, worn.visibility)
         levels = np.rint((completed + 1) * 127.5).clip(0, 255).astype(np.uint8)
         return np.ascontiguousarray(levels.transpose(1, 2, 0))
