@@ -87,8 +87,12 @@ def pick_nearest(values: Shaped[np.ndarray, "*C t t"], size: int) -> Shaped[np.n
 
 def differ_in_any_light(
     colours: Float32[np.ndarray, "3 N"],
-    of: Float32[np.ndarray, (3 #N
-)],
+    of: Float32[
+        np.ndarray,
+        (
+            3  # N
+        ),
+    ],
     shades: tuple[float, float],
 ) -> Float32[np.ndarray, " N"]:
     """Tell how far colours are from others, 0 to 1, in the light that makes them most alike.
