@@ -733,6 +733,28 @@ def test_gaps_are_shown_and_filled(tmp_path, open_page) -> None:
         page.close()
 
 
+def test_a_motion_that_is_read_again_keeps_the_place(preview, open_page) -> None:
+    """Between two states of the same motion there may be one without any."""
+    frames = open_page(preview.link).evaluate(
+        """async () => {
+            const { Looking } = await import(new URL("looking.js", document.baseURI));
+            const looking = new Looking();
+            const receive = (revision, motion, driver) =>
+                looking.receive({ revision, motion, driver, sources: [], options: {} });
+            receive(1, 0, { frame_count: 6 });
+            looking.look({ frame: 4 });
+            receive(2, 0, null);
+            looking.look({ frame: looking.frame + 1 });
+            receive(3, 0, { frame_count: 6 });
+            const kept = looking.frame;
+            receive(4, 1, null);
+            receive(5, 1, { frame_count: 6 });
+            return [kept, looking.frame];
+        }"""
+    )
+    assert frames == [4, 0]
+
+
 def test_without_the_token_nothing_is_told(preview) -> None:
     for path in ("/", "/events", "/wrong/", "/wrong/events", "/wrong/frame/0/iuv", "/page.js"):
         status, _, body = preview.ask("GET", path)

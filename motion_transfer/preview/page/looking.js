@@ -5,6 +5,7 @@ import { rateOf } from "./dom.js";
 export class Looking extends EventTarget {
   state = null;
   frame = 0;
+  motion = null; // the number of the one that the frame is of
   view = "result";
   photo = null; // the number of the source that its view shows; null: the one that leads
   playing = false;
@@ -18,9 +19,12 @@ export class Looking extends EventTarget {
     // Answers to what was posted and the stream of events may overtake each other.
     if (this.state && state.revision < this.state.revision && !this.reconnecting) return;
     this.reconnecting = false;
-    const first = state.driver && (!this.state?.driver || this.state.motion !== state.motion);
     this.state = state;
-    if (first) this.frame = state.options.frames?.[0] ?? 0;
+    // While the same motion is read again, as another choice needs it, nobody loses their place.
+    if (state.driver && state.motion !== this.motion) {
+      this.motion = state.motion;
+      this.frame = state.options.frames?.[0] ?? 0;
+    }
     this.frame = this.clamp(this.frame);
     if (!state.sources.some(({ number }) => number === this.photo)) this.photo = null;
     this.dispatchEvent(new Event("state"));
@@ -82,6 +86,7 @@ export class Looking extends EventTarget {
   }
 
   clamp(frame) {
+    if (!this.count) return this.frame; // that of a motion which is not there at the moment
     return Math.max(0, Math.min(Math.round(frame) || 0, Math.max(this.count - 1, 0)));
   }
 }
