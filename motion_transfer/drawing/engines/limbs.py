@@ -1,7 +1,8 @@
-"""Arms and legs, in the colours that a photo shows of them at the same place along the limb.
+"""Arms and legs, in the hues that a photo shows around them.
 
 A sleeve, a leg and bare skin go all the way around. Where a photo shows a limb from one side,
-FeatureNet's guess of the other side may be smeared with what lies next to it in the photo.
+FeatureNet's guess of the other one has its light, but may be smeared with what lies next to it in
+the photo: a red sleeve goes over into brown, skin is violet.
 """
 
 from __future__ import annotations
@@ -11,22 +12,27 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, Int64
+from jaxtyping import Bool, Float32, Int64
 
 from motion_transfer.drawing.engines.interface import Guess
-from motion_transfer.drawing.textures import fall, pick_nearest
+from motion_transfer.drawing.textures import differ_in_any_light, fall, pick_nearest
+from motion_transfer.media.nearest import nearest_points
 from nhrr_core import PART_GROUPS, load_uv_tables
 
 LIMBS = (
-    (0, ("upper-arms", "lower-arms", "hands")),
+    (0, ("upper-arms", "lower-arms")),
     (1, ("upper-legs", "lower-legs")),
 )
 """The axis of `UVTables.position` that a limb lies along, and its parts on both sides."""
 
-STEP_METRES = 0.01  # along a limb
-SPREAD = 1.5  # steps: what is seen counts for its neighbours by a Gaussian of that width
-LEAST_SEEN = 9.0  # texels of the map at a step, a tenth of an arm's; fewer tell nothing
-ALIKE, APART = 0.3, 0.6  # colours of guess and limb, in [-1, 1]: it stays; it is another thing
+ALONG = 4.0  # times as far counts what lies along a limb, not around it: sleeves have ends
+EVERY, AROUND = 4, 20  # of the seen texels every fourth, of these the nearest: their mean
+BLUNT_METRES = 0.01  # added to their distance, by whose square they count less
+FEWEST = 25  # texels that are seen, of those; fewer tell nothing
+FARTHEST_METRES = 0.06  # along the limb: what is seen farther off may be another garment
+PLAIN, PATTERNED = 0.08, 0.12  # of 1: how far these differ from their mean, in any light
+LIGHT = (0.75, 1.15)  # the guess's, in that of what is seen around it
+ALIKE, APART = 0.04, 0.1  # of 1, in that light: the guess stays; it is another thing
 
 
 class Limb(NamedTuple):
@@ -34,36 +40,63 @@ class Limb(NamedTuple):
 
     Attributes:
         texels: Those of it.
-        steps: How far along it each of them lies, in STEP_METRES from its beginning.
+        places: Where they are, metres, ALONG times as far along it as they are.
+        axis: The one that it lies along.
     """
 
     texels: Int64[np.ndarray, " N"]
-    steps: Float32[np.ndarray, " N"]
+    places: Float32[np.ndarray, "N 3"]
+    axis: int
 
 
 def go_around_limbs(guess: Guess) -> None:
-    """Give hidden sides of limbs the mean of what is seen around them, if their own is far off."""
+    """Give hidden sides of limbs the hue of what is seen around them, if their own is far off."""
     texture, colours = (each.reshape(len(each), -1) for each in (guess.texture, guess.colours))
-    shown, hidden = guess.shown.reshape(-1), guess.hidden.reshape(-1)
+    # at the edges of what is seen, IUV often has another part's pixels
+    sure = cv2.erode(guess.shown.astype(np.uint8), np.ones((3, 3), np.uint8)).reshape(-1) > 0
+    hidden = guess.hidden.reshape(-1)
     for limb in find_limbs(len(guess.shown)):
-        seen = shown[limb.texels]
-        means, counts = _average_along(texture[:, limb.texels[seen]], limb.steps[seen], limb.steps)
-        change = means - colours[:, limb.texels]
-        share = hidden[limb.texels] * (1 - fall(np.abs(change).mean(0), ALIKE, APART))
-        colours[:, limb.texels] += change * share * (counts >= LEAST_SEEN)
+        seen, asked = sure[limb.texels], hidden[limb.texels] > 0
+        seen &= np.cumsum(seen) % EVERY == 0
+        if np.count_nonzero(seen) < FEWEST:
+            continue
+        texels = limb.texels[asked]
+        around, told = _average_around(limb, seen, asked, to_levels(texture[:, limb.texels[seen]]))
+        own = to_levels(colours[:, texels])
+        light = (own * around).sum(0) / np.maximum((around * around).sum(0), np.float32(1e-4))
+        change = around * light.clip(*LIGHT) - own
+        share = hidden[texels] * told * (1 - fall(np.abs(change).max(0), ALIKE, APART))
+        colours[:, texels] += 2 * change * share
 
 
-def _average_along(
-    values: Float32[np.ndarray, "C M"],
-    steps: Float32[np.ndarray, " M"],
-    wanted: Float32[np.ndarray, " N"],
-) -> tuple[Float32[np.ndarray, "C N"], Float32[np.ndarray, " N"]]:
-    """Average values along a limb, where it is wanted; and how many there are."""
-    count, nearest = round(float(wanted.max())) + 1, np.rint(steps).astype(np.int64)
-    rows = [np.bincount(nearest, each, count) for each in (*values, np.ones_like(steps))]
-    sums = cv2.GaussianBlur(np.array(rows, np.float32), (0, 0), SPREAD, sigmaY=1e-3)
-    *totals, counts = (np.interp(wanted, np.arange(count), row) for row in sums)
-    return (np.stack(totals) / np.maximum(counts, 1e-3)).astype(np.float32), counts
+def to_levels(colours: Float32[np.ndarray, "3 N"]) -> Float32[np.ndarray, "3 N"]:
+    """Bring colours in [-1, 1] to [0, 1], where light multiplies them."""
+    return (colours + 1) / 2
+
+
+def _average_around(
+    limb: Limb,
+    seen: Bool[np.ndarray, " N"],
+    asked: Bool[np.ndarray, " N"],
+    levels: Float32[np.ndarray, "3 S"],
+) -> tuple[Float32[np.ndarray, "3 M"], Float32[np.ndarray, " M"]]:
+    """Average the colours of what is seen around each texel that is asked for.
+
+    Args:
+        levels: The colours of the seen texels, 0 to 1.
+    Returns: The means, and how much they tell, 0 to 1: little where there are several colours.
+    """
+    known, wanted = limb.places[seen], limb.places[asked]
+    away, index = nearest_points(known, wanted, AROUND)
+    weights = np.square(away + np.float32(BLUNT_METRES)) ** -1
+    weights /= weights.sum(1, keepdims=True)
+    near = levels[:, index]
+    means = (near * weights).sum(2)
+    alike = np.broadcast_to(means[..., None], near.shape)
+    apart = differ_in_any_light(near.reshape(3, -1), alike.reshape(3, -1), (0.5, 2.0))
+    variety = (apart.reshape(away.shape) * weights).sum(1)
+    gap = np.abs(known[index[:, 0], limb.axis] - wanted[:, limb.axis]) / ALONG
+    return means, fall(variety, PLAIN, PATTERNED) * (gap < FARTHEST_METRES)
 
 
 @lru_cache(maxsize=2)
@@ -75,8 +108,8 @@ def find_limbs(size: int) -> list[Limb]:
     found = []
     for axis, groups in LIMBS:
         own = np.isin(part, [each for group in groups for each in PART_GROUPS[group]])
+        stretch = np.where(np.arange(3) == axis, np.float32(ALONG), np.float32(1))
         for side in (position[0] < 0, position[0] >= 0):
             texels = np.flatnonzero(own & side)
-            along = np.abs(position[axis, texels])
-            found.append(Limb(texels, (along - along.min()) / np.float32(STEP_METRES)))
+            found.append(Limb(texels, position[:, texels].T * stretch, axis))
     return found

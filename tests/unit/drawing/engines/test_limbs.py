@@ -1,4 +1,4 @@
-"""Hidden sides of arms and legs: they are amended where a guess is far from what is seen around."""
+"""Hidden sides of arms and legs: they get the hue of what is seen around them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from motion_transfer.drawing.engines.guesses import amend_guesses
 from motion_transfer.drawing.engines.interface import FeatureMap
-from motion_transfer.drawing.engines.limbs import find_limbs, go_around_limbs
+from motion_transfer.drawing.engines.limbs import LIGHT, find_limbs, go_around_limbs, to_levels
 from motion_transfer.drawing.source import Source
 from nhrr_core import PART_GROUPS, load_uv_tables
 
@@ -19,50 +19,78 @@ TABLES = load_uv_tables()
 FRONTS = np.isin(TABLES.part, (15, 16, 19, 20, 9, 10, 13, 14))  # of sleeves, one face of each limb
 ARMS = np.isin(TABLES.part, PART_GROUPS["upper-arms"] + PART_GROUPS["lower-arms"])
 LEGS = np.isin(TABLES.part, PART_GROUPS["upper-legs"] + PART_GROUPS["lower-legs"])
-SLEEVE, SKIN, SMEAR, TROUSERS = 0.8, 0.2, -0.6, -0.7
+ALONG = np.abs(TABLES.position[..., 0])
 ELBOW = 0.42  # metres along x
+RED, SKIN, BLUE, BROWN = (0.6, -0.7, -0.7), (0.6, 0.2, 0.0), (-0.7, -0.6, 0.1), (0.1, -0.3, -0.5)
+Colour = tuple[float, float, float]
 
 
-def source(shown: np.ndarray) -> Source:
-    """Somebody with short sleeves, of whom that much is seen, at four times the map's size."""
-    sleeve = ARMS & (np.abs(TABLES.position[..., 0]) < ELBOW)
-    worn = np.where(sleeve, SLEEVE, np.where(LEGS, TROUSERS, SKIN))
-    texture = np.broadcast_to(worn * shown, (3, SIZE, SIZE)).astype(np.float32)
-    finer = [np.kron(each, np.ones((1, 4, 4), np.float32)) for each in (texture, shown[None] * 1.0)]
-    return cast(Source, SimpleNamespace(texture=finer[0], visibility=finer[1].astype(np.float32)))
+def paint(*layers: tuple[np.ndarray, Colour]) -> np.ndarray:
+    """Colour a texture; later layers lie over earlier ones."""
+    texture = np.zeros((3, SIZE, SIZE), np.float32)
+    for where, colour in layers:
+        texture[:, where] = np.array(colour, np.float32)[:, None]
+    return texture
 
 
-def amended(level: float, shown: np.ndarray) -> np.ndarray:
-    features = np.full((1, 16, SIZE, SIZE), level, np.float32)
+WORN = paint((ARMS, SKIN), (ARMS & (ALONG < ELBOW), RED), (LEGS, BLUE))
+"""Red short sleeves and blue trousers."""
+
+
+def source(worn: np.ndarray, shown: np.ndarray) -> Source:
+    """Somebody of whom that much is seen, at four times the map's size."""
+    finer = [np.kron(each, np.ones((1, 4, 4), np.float32)) for each in (worn * shown, shown[None])]
+    texture, visibility = (each.astype(np.float32) for each in finer)
+    return cast(Source, SimpleNamespace(texture=texture, visibility=visibility))
+
+
+def amended(guessed: np.ndarray, worn: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    features = np.zeros((1, 16, SIZE, SIZE), np.float32)
+    features[0, :3] = guessed
     guess = FeatureMap(features, np.zeros((1, 3, 4 * SIZE, 4 * SIZE), np.float32))
-    return amend_guesses(guess, source(shown), [go_around_limbs]).features[0]
+    after = amend_guesses(guess, source(worn, shown), [go_around_limbs]).features[0]
+    assert not after[3:].any(), "what are no colours stays"
+    assert (after[:3, shown] == guessed[:, shown]).all(), "and so does what is seen"
+    return after[:3]
 
 
 def test_a_smeared_back_of_an_arm_becomes_sleeve_and_skin() -> None:
-    after = amended(SMEAR, FRONTS)
-    along = np.abs(TABLES.position[..., 0])
-    for colour, place in ((SLEEVE, along < ELBOW - 0.04), (SKIN, along > ELBOW + 0.04)):
-        hidden = ARMS & ~FRONTS & place
-        assert np.abs(after[:3, hidden] - colour).max() < 0.05
-    assert (after[:, FRONTS] == np.float32(SMEAR)).all(), "what is seen is never amended"
-    assert (after[3:] == np.float32(SMEAR)).all(), "nor what are no colours"
-    legs = LEGS & ~FRONTS  # trousers, whose guess is not far off
-    assert (after[:, legs] == np.float32(SMEAR)).all()
+    after = amended(paint((ARMS, BROWN), (LEGS, BLUE)), WORN, FRONTS)
+    for colour, place in ((RED, ALONG < ELBOW - 0.03), (SKIN, ALONG > ELBOW + 0.03)):
+        hidden = to_levels(after[:, ARMS & ~FRONTS & place])
+        hue = to_levels(np.array(colour, np.float32)[:, None])
+        light = hidden.sum(0) / hue.sum()
+        assert np.abs(hidden - hue * light).max() < 0.02
+        assert light.min() > LIGHT[0] - 0.02
+        assert light.max() < LIGHT[1] + 0.02
+
+
+def test_the_guess_keeps_its_light() -> None:
+    shade = np.float32(0.8)
+    shaded = (to_levels(WORN) * shade * 2 - 1) * ARMS
+    tinted = shaded + np.array([0.0, 0.25, 0.25], np.float32)[:, None, None] * ARMS
+    hidden = ARMS & ~FRONTS & (ALONG < ELBOW - 0.04)
+    assert (amended(shaded, WORN, FRONTS)[:, hidden] == shaded[:, hidden]).all()
+    after = to_levels(amended(tinted, WORN, FRONTS)[:, hidden]) / to_levels(WORN[:, hidden])
+    assert np.abs(after - shade).max() < 0.12
+    assert np.ptp(after, axis=0).max() < 0.02, "the tint is gone"
+
+
+FLOWERS = np.kron(np.random.default_rng(0).random((SIZE // 2, SIZE // 2)) < 0.5, np.ones((2, 2)))
+PRINT = paint((ARMS, RED), (ARMS & (FLOWERS > 0), BLUE))
 
 
 @pytest.mark.parametrize(
-    ("guess", "shown"),
-    [(SLEEVE - 0.1, FRONTS & ARMS & (np.abs(TABLES.position[..., 0]) < ELBOW)), (SMEAR, ~ARMS)],
-    ids=["a guess that is near", "arms out of sight"],
+    ("worn", "shown"),
+    [(PRINT, FRONTS), (WORN, FRONTS & LEGS), (WORN, FRONTS & ARMS & (ALONG < ELBOW - 0.1))],
+    ids=["of several colours", "out of sight", "another piece of it is seen"],
 )
-def test_the_guess_stays(guess: float, shown: np.ndarray) -> None:
-    after = amended(guess, shown)
-    along = np.abs(TABLES.position[..., 0])
-    # shoulders have neighbours that are seen
-    upper = (
-        np.isin(TABLES.part, PART_GROUPS["upper-arms"]) & (along > 0.24) & (along < ELBOW - 0.08)
-    )
-    assert (after[:, upper] == np.float32(guess)).all()
+def test_the_guess_stays(worn: np.ndarray, shown: np.ndarray) -> None:
+    guess = paint((ARMS, BROWN))
+    after = amended(guess, worn, shown)
+    lower = np.isin(TABLES.part, PART_GROUPS["lower-arms"])
+    changed = (after[:, lower] != guess[:, lower]).any(0)
+    assert changed.mean() < 0.002, "but for a texel whose surroundings are of one colour by chance"
 
 
 def test_limbs_are_four_tubes_of_their_own() -> None:
@@ -70,6 +98,5 @@ def test_limbs_are_four_tubes_of_their_own() -> None:
     assert len(limbs) == 4
     texels = np.concatenate([limb.texels for limb in limbs])
     assert len(np.unique(texels)) == len(texels)
-    for limb, metres in zip(limbs, (0.67, 0.67, 0.79, 0.79), strict=True):
-        assert limb.steps.min() == 0
-        assert limb.steps.max() / 100 == pytest.approx(metres, abs=0.04)
+    for limb, metres in zip(limbs, (0.5, 0.5, 0.79, 0.79), strict=True):
+        assert np.ptp(limb.places[:, limb.axis]) / 4 == pytest.approx(metres, abs=0.04)
