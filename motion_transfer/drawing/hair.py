@@ -116,7 +116,7 @@ class Strands(NamedTuple):
 
 def _look_for_strands(source: Source) -> Strands | None:
     """Find what a photo shows of the person beside neck and lower head; None if nothing."""
-    alpha = source.photo.alpha if source.alpha is None else source.alpha
+    alpha = source.photo.cutout if source.alpha is None else source.alpha
     box = bounding_box(keep_parts(source.iuv, PART_GROUPS["head"]))
     if alpha is None or not box.area:
         return None

@@ -37,9 +37,9 @@ def clearance_of(
     How it lies in UV space says `nhrr_core.unfold_clearance`.
 
     Args:
-        alpha: Says where the person ends; None: the photo's own alpha, or else a plain backdrop.
+        alpha: Says where the person ends; None: the photo's own cutout, or else a plain backdrop.
     """
-    alpha = photo.alpha if alpha is None else alpha
+    alpha = photo.cutout if alpha is None else alpha
     unknown = np.zeros((CLEARANCE_CHANNELS, CLEARANCE_SIZE, CLEARANCE_SIZE), np.float32)
     box = bounding_box(iuv)
     if not box.area:

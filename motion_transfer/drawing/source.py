@@ -268,7 +268,7 @@ def unfold_picture(
 ) -> tuple[Float32[np.ndarray, "3 T T"], Float32[np.ndarray, "1 T T"]]:
     """Unfold a photo, at its full resolution, into a partial texture in [-1, 1] and visibility."""
     photo, iuv = picture.photo, picture.iuv
-    alpha = photo.alpha if picture.alpha is None else picture.alpha
+    alpha = photo.cutout if picture.alpha is None else picture.alpha
     box = bounding_box(iuv)
     if not box.area:
         blank = np.zeros((4, texture_size, texture_size), np.float32)

@@ -41,7 +41,7 @@ def describe_photo(path: Path) -> Facts:
     facts: Facts = {
         "what": "picture" + (", turned upright as its EXIF says" if photo.turned else ""),
         "size": f"{width} x {height}",
-        "alpha": "no" if photo.alpha is None else "yes",
+        "alpha": _describe_alpha(photo),
     }
     if photo.profile:
         facts["colours"] = f"converted from {photo.profile} to sRGB"
@@ -50,6 +50,12 @@ def describe_photo(path: Path) -> Facts:
     if path.suffix.lower() in PHOTO_SUFFIXES and (clip := open_pictures(path)).frame_count > 1:
         facts |= describe_length(clip)
     return facts | _describe_people(photo)
+
+
+def _describe_alpha(photo: Photo) -> str:
+    if photo.alpha is None:
+        return "no"
+    return "yes" if photo.cutout is not None else "opaque, which tells nothing of the person"
 
 
 def describe_clip(path: Path) -> Facts:

@@ -93,7 +93,7 @@ class PhotoFile:
     @property
     def has_alpha(self) -> bool:
         """Whether `load` would find one. Raises: InputError if the photo cannot be read."""
-        return self.alpha_path.exists() or read_photo(self.path, "photo").alpha is not None
+        return self.alpha_path.exists() or read_photo(self.path, "photo").cutout is not None
 
     def load(self) -> PersonPicture:
         """Read photo, IUV and alpha.
@@ -104,7 +104,7 @@ class PhotoFile:
         iuv = read_person(photo, self.iuv_path, "largest", self.iuv_order, "photo")
         if not iuv.any():
             raise InputError(f"photo {self.path}: its alpha leaves nobody of its IUV")
-        alpha, path = photo.alpha, self.alpha_path
+        alpha, path = photo.cutout, self.alpha_path
         if alpha is None and path.exists():
             alpha = np.ascontiguousarray(read_photo(path, "alpha").rgb[..., 0])
             if alpha.shape != photo.rgb.shape[:2]:

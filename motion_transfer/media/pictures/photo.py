@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import BinaryIO
 
@@ -17,7 +18,7 @@ from PIL import ExifTags, Image, UnidentifiedImageError
 
 from motion_transfer.errors import InputError
 from motion_transfer.extras import require_extra
-from motion_transfer.media.alpha import add_alpha, lay_on_white
+from motion_transfer.media.alpha import OPAQUE, add_alpha, lay_on_white
 from motion_transfer.media.files import read_bytes
 from motion_transfer.media.pictures.colours import ProfileError, convert_lab, convert_to_srgb
 from motion_transfer.media.pictures.png import SIGNATURE, find_png_fault
@@ -51,6 +52,9 @@ PHOTOMETRIC, WHITE_IS_ZERO = 262, 0
 PLANAR_CONFIGURATION, PLANAR = 284, 2
 SAMPLE_FORMAT, UNSIGNED, UNDEFINED = 339, 1, 4
 
+RECTANGLE_SHARE = 0.97
+"""Of the box around what is opaque: people fill less, a window with rounded corners more."""
+
 NO_WHITE = ", and nothing says which one is white; save it with 8 or 16 bits a channel"
 
 
@@ -72,6 +76,21 @@ class Photo:
     turned: bool
     profile: str | None = None
     notes: tuple[str, ...] = ()
+
+    @cached_property
+    def cutout(self) -> UInt8[np.ndarray, "H W"] | None:
+        """The alpha if it tells where what is shown ends, else None.
+
+        One that is opaque all over a rectangle does not: many programs write an alpha channel that
+        is opaque everywhere, or but for the rounded corners of a window.
+        """
+        if self.alpha is None:
+            return None
+        opaque = self.alpha >= OPAQUE / 2
+        *_, width, height = cv2.boundingRect(opaque.view(np.uint8))
+        if width and np.count_nonzero(opaque) >= RECTANGLE_SHARE * width * height:
+            return None
+        return self.alpha
 
     def on_white(self) -> UInt8[np.ndarray, "H W 3"]:
         """Lay the picture on paper: where it is transparent, white shows."""

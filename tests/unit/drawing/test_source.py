@@ -234,3 +234,25 @@ def test_what_clothes_cover_of_others_goes_with_them(taken, beside, far_off) -> 
 
 def test_one_leg_alone_covers_no_shoe() -> None:
     assert untouched_texels(frozenset((11, 13)))[np.isin(load_uv_tables().part, (5, 6))].all()
+
+
+@pytest.mark.parametrize("corners", [0, 40, 120], ids=["opaque", "rounded", "a window's shadow"])
+def test_an_alpha_that_cuts_nobody_out_changes_nothing(studio, corners: int) -> None:
+    """As screenshots and exported pictures have it; trimmed to it, a backdrop was worn."""
+    photo = studio.source()
+    plain = prepare(photo)
+    rgb = cv2.imread(str(photo))
+    alpha = np.full(rgb.shape[:2], 255, np.uint8)
+    if corners == 40:
+        alpha[:3, :1] = alpha[-1:, -3:] = corners
+    elif corners:
+        alpha[[0, -1]] = alpha[:, [0, -1]] = corners
+    cv2.imwrite(str(photo), np.dstack([rgb, alpha]))
+    source = prepare(photo)
+    assert source.photo.alpha is not None
+    assert source.photo.cutout is None
+    assert (source.texture == plain.texture).all()
+    assert (source.visibility == plain.visibility).all()
+    assert source.clearance is not None
+    assert plain.clearance is not None
+    assert (source.clearance == plain.clearance).all()

@@ -52,6 +52,23 @@ def test_alpha_is_kept_apart(tmp_path: Path) -> None:
     assert (photo.alpha == 7).all()
 
 
+def test_only_an_alpha_with_a_shape_is_a_cutout(tmp_path: Path) -> None:
+    y, x = np.mgrid[:60, :40]
+    disc = ((np.hypot(y - 30, x - 20) < 18) * 255).astype(np.uint8)
+    window = np.zeros((60, 40), np.uint8)
+    window[10:50, 5:35] = 255
+    shapes = {"disc": disc, "opaque": np.full_like(disc, 255), "window": window, "clear": disc * 0}
+    found = {}
+    for name, alpha in shapes.items():
+        Image.fromarray(np.dstack([disc, disc, disc, alpha])).save(tmp_path / f"{name}.png")
+        found[name] = read_photo(tmp_path / f"{name}.png").cutout
+    assert found["disc"] is not None
+    assert (found["disc"] == disc).all()
+    assert found["clear"] is not None, "which leaves nobody"
+    assert found["opaque"] is None
+    assert found["window"] is None
+
+
 def test_a_transparent_palette_colour_is_alpha(tmp_path: Path) -> None:
     image = Image.fromarray(np.array([[0, 1]], np.uint8)).convert("P")
     image.putpalette([10, 20, 30, 40, 50, 60])
