@@ -15,6 +15,7 @@ from motion_transfer.drawing.light import cast_shadow, relight
 from motion_transfer.drawing.renderers.interface import Renderer
 from motion_transfer.drawing.source import Source
 from motion_transfer.drawing.window import Window
+from motion_transfer.media.alpha import add_alpha
 
 PART_COLOUR_STEP = 10  # 24 parts over 0..240, as DensePose draws them
 CHECKER_PX, CHECKER_LEVELS = 16, (255, 204)  # as editors show that nothing is there
@@ -101,7 +102,8 @@ def lay_over(frame: Picture, rgba: UInt8[np.ndarray, "h w 4"], x: int, y: int) -
     person = np.s_[top : top + height, left : left + width]
     over, target, coverage = over[person], target[person], coverage[person]
     colour = over if frame.shape[2] == 4 else cv2.cvtColor(over, cv2.COLOR_RGBA2RGB)
-    edge = np.nonzero(cv2.inRange(coverage, 1, 254))
+    # 0 becomes 255; `np.nonzero` of two axes takes nine times as long
+    edge = np.divmod(np.flatnonzero(coverage - np.uint8(1) < 254), coverage.shape[1])
     if frame.shape[2] == 4:
         blend = _blend_rgba(over[edge], target[edge])
     else:
@@ -151,7 +153,7 @@ def _enlarge(rgba: Rgba, side: int) -> Rgba:
     colours, outline = (
         cv2.resize(each, (side, side), interpolation=cv2.INTER_CUBIC) for each in (colours, outline)
     )
-    return np.dstack([colours, cv2.LUT(outline, levels.clip(0, 255).round().astype(np.uint8))])
+    return add_alpha(colours, cv2.LUT(outline, levels.clip(0, 255).round().astype(np.uint8)))
 
 
 def show_alpha(picture: Picture) -> Frame:
