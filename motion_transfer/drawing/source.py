@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
@@ -20,7 +21,7 @@ from motion_transfer.drawing.person import (
 )
 from motion_transfer.drawing.textures import enlarge, merge_textures, pick_nearest
 from motion_transfer.drawing.trimming import trim
-from motion_transfer.drawing.unfolding import extract_texture, keep_parts
+from motion_transfer.drawing.unfolding import extract_texture, keep_parts, pixels_per_texel
 from motion_transfer.drawing.views import View, merge_views, rate_texels
 from motion_transfer.drawing.window import BEYOND_THE_PHOTO, cut_picture, plan_window
 from motion_transfer.errors import InputError
@@ -30,6 +31,7 @@ from motion_transfer.media.iuv.opening import read_single_iuv
 from motion_transfer.media.nearest import nearest_points
 from motion_transfer.media.pictures.photo import Photo
 from nhrr_core import ALL_PARTS, PART_GROUPS, PART_NAMES, load_uv_tables
+from nhrr_core.config import CLEARANCE_SIZE
 from nhrr_core.uv_tables import SAMPLES_PER_TEXEL
 
 SURROUNDINGS_SHARE = 0.15  # of the person's height: enough background around to know its colours
@@ -38,6 +40,10 @@ OVERLAP_METRES = 0.05
 OVERLAPS = {"lower-legs": "feet", "lower-arms": "hands", "torso": "upper-legs"}
 """Clothes hang over what they are not worn on: hems over shoes, cuffs over hands, shirts over
 trousers. Whose clothes of the former are taken away shows so much less of the latter."""
+
+MOST_PIXELS_PER_TEXEL = 2.0  # along a side; more are averaged anyway
+LEAST_HEIGHT = 1500  # px; smaller bodies cost little, and lose texels at their outline
+MEASURED_HEIGHT = 500  # px; of a taller body not every pixel is counted
 
 DENSE_TEXELS = 512  # a side; finer textures may miss texels, which are then as coarse as the map
 
@@ -266,21 +272,15 @@ def cut_source(picture: SourcePicture, size: int) -> UInt8[np.ndarray, "6 S S"]:
 def unfold_picture(
     picture: SourcePicture, texture_size: int
 ) -> tuple[Float32[np.ndarray, "3 T T"], Float32[np.ndarray, "1 T T"]]:
-    """Unfold a photo, at its full resolution, into a partial texture in [-1, 1] and visibility."""
-    photo, iuv = picture.photo, picture.iuv
-    alpha = photo.cutout if picture.alpha is None else picture.alpha
-    box = bounding_box(iuv)
-    if not box.area:
+    """Unfold a photo into a partial texture in [-1, 1] and visibility.
+
+    At its full resolution, or in the one that the texture holds: a large photo takes seconds less.
+    """
+    if not picture.iuv[..., 0].any():
         blank = np.zeros((4, texture_size, texture_size), np.float32)
         return blank[:3], blank[3:]
-    # nothing farther away is looked at: of a large photo that saves most of the work
-    margin = round((box.height - 1) * SURROUNDINGS_SHARE)
-    body = np.s_[
-        max(0, box.top - margin) : box.bottom + margin,
-        max(0, box.left - margin) : box.right + margin,
-    ]
-    rgb, own = np.ascontiguousarray(photo.rgb[body]), np.ascontiguousarray(iuv[body])
-    trimmed = trim(rgb, own, None if alpha is None else alpha[body])
+    rgb, iuv, alpha = _cut_to_unfold(picture, texture_size)
+    trimmed = trim(rgb, iuv, alpha)
     colours = rgb / np.float32(127.5) - 1
     return extract_texture(
         colours,
@@ -288,6 +288,31 @@ def unfold_picture(
         texture_size,
         samples_per_texel=SAMPLES_PER_TEXEL if texture_size <= DENSE_TEXELS else 1,
     )
+
+
+def _cut_to_unfold(
+    picture: SourcePicture, texture_size: int
+) -> tuple[UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"] | None]:
+    """Cut the surroundings of a person out of photo, IUV and alpha, no finer than can be held."""
+    photo, iuv = picture.photo, picture.iuv
+    alpha = photo.cutout if picture.alpha is None else picture.alpha
+    box = bounding_box(iuv)
+    # nothing farther away is looked at: of a large photo that saves most of the work
+    margin = round((box.height - 1) * SURROUNDINGS_SHARE)
+    body = np.s_[
+        max(0, box.top - margin) : box.bottom + margin,
+        max(0, box.left - margin) : box.right + margin,
+    ]
+    rgb, iuv, alpha = photo.rgb[body], iuv[body], None if alpha is None else alpha[body]
+    every = max(1, box.height // MEASURED_HEIGHT)
+    density = pixels_per_texel(iuv[::every, ::every]) * every * CLEARANCE_SIZE / texture_size
+    scale = max(MOST_PIXELS_PER_TEXEL / density, LEAST_HEIGHT / box.height)
+    if scale < 1:
+        size = max(1, round(rgb.shape[1] * scale)), max(1, round(rgb.shape[0] * scale))
+        rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
+        iuv = cv2.resize(iuv, size, interpolation=cv2.INTER_NEAREST_EXACT)
+        alpha = None if alpha is None else cv2.resize(alpha, size, interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(rgb), np.ascontiguousarray(iuv), alpha
 
 
 def read_person(

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from motion_transfer.drawing.source import Source, untouched_texels
+from motion_transfer.drawing.trimming import trim
 from motion_transfer.errors import InputError
 from motion_transfer.render.options import Garment, SourceOptions, parse_parts
 from motion_transfer.render.source import read_source
@@ -256,3 +257,27 @@ def test_an_alpha_that_cuts_nobody_out_changes_nothing(studio, corners: int) -> 
     assert source.clearance is not None
     assert plain.clearance is not None
     assert (source.clearance == plain.clearance).all()
+
+
+def test_a_large_photo_is_unfolded_no_finer_than_a_texture_holds(studio, monkeypatch) -> None:
+    photo = studio.source()
+    for path in (photo, studio.folder / "person_IUV.png"):
+        picture = cv2.imread(str(path))
+        scale = 4000 / len(picture)
+        large = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+        cv2.imwrite(str(path), large)
+    heights: list[int] = []
+
+    def trim_and_tell(rgb: np.ndarray, *arguments: object) -> np.ndarray:
+        heights.append(len(rgb))
+        return trim(rgb, *arguments)
+
+    monkeypatch.setattr("motion_transfer.drawing.source.trim", trim_and_tell)
+    quick = prepare(photo)
+    monkeypatch.setattr("motion_transfer.drawing.source.LEAST_HEIGHT", np.inf)
+    whole = prepare(photo)
+    assert heights[0] < 0.6 * heights[1]
+    both = (quick.visibility * whole.visibility)[0] > 0
+    assert both.sum() > 0.97 * max(quick.visibility.sum(), whole.visibility.sum())
+    apart = np.abs(quick.texture - whole.texture)[:, both].max(0)
+    assert np.percentile(apart, 95) < 0.05, "all but the borders between colours"
