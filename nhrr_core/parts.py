@@ -47,3 +47,6 @@ PART_GROUPS: dict[str, tuple[int, ...]] = {
     "head": (23, 24),
 }
 """The words people use for garments, each for both sides and both faces of the limb."""
+
+FOREARMS: dict[int, tuple[int, int]] = {3: (20, 22), 4: (19, 21)}
+"""The two faces of each hand's forearm."""

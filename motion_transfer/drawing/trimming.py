@@ -14,8 +14,9 @@ from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
 from motion_transfer.drawing.views import HEAD
 from motion_transfer.media.nearest import take_nearest
 from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core.parts import FOREARMS
 
-ARMS = (3, 20, 22), (4, 19, 21)  # a hand and its forearm
+ARMS = [(hand, *forearm) for hand, forearm in FOREARMS.items()]
 BAND_SHARE = 0.025  # of the person's height: IUV outlines stray over the background by up to that
 CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up to that
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background

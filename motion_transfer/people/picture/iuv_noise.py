@@ -20,6 +20,7 @@ from jaxtyping import UInt8
 from scipy.ndimage import find_objects
 
 from motion_transfer.people.picture.paint import smooth_noise
+from nhrr_core.parts import FOREARMS
 
 Iuv = UInt8[np.ndarray, "H W 3"]
 Parts = UInt8[np.ndarray, "H W"]
@@ -34,8 +35,6 @@ LOWER_LIMB_PAIRS = 3
 
 FACES = ((1, 2), (7, 9), (8, 10), (11, 13), (12, 14), (15, 17), (16, 18), (19, 21), (20, 22))
 """The two faces of the torso and of each limb."""
-HANDS = ((3, (20, 22)), (4, (19, 21)))
-"""Each hand, and its forearm."""
 FEET = (5, 6)
 
 # where the twin's chart runs the other way; measured on the charts through `nhrr_core.UVLayout`
@@ -165,7 +164,7 @@ def lose_parts(iuv: Iuv, hand: float, forearm: float, foot: float, rng: Rng) -> 
     """
     draws = rng.random(6)  # always as many, so that one rate does not shift what others draw
     lost = [f for f, draw in zip(FEET, draws[:2], strict=True) if draw < foot]
-    for (part, arm), draw, arm_draw in zip(HANDS, draws[2:4], draws[4:], strict=True):
+    for (part, arm), draw, arm_draw in zip(FOREARMS.items(), draws[2:4], draws[4:], strict=True):
         if draw < hand:
             lost += [part, *arm] if arm_draw < forearm else [part]
     if not lost:

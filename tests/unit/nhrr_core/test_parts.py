@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from nhrr_core import ALL_PARTS, PART_COUNT, PART_GROUPS, PART_NAMES
+from nhrr_core.parts import FOREARMS
 
 
 def test_every_part_has_a_name_of_its_own() -> None:
@@ -37,3 +38,12 @@ def test_groups_hold_what_they_are_called() -> None:
     for group, parts in PART_GROUPS.items():
         for part in parts:
             assert PART_NAMES[part].startswith(group.replace("feet", "foot").rstrip("s"))
+
+
+def test_each_hand_has_the_forearm_of_its_side() -> None:
+    assert set(FOREARMS) == set(PART_GROUPS["hands"])
+    for hand, forearm in FOREARMS.items():
+        side = PART_NAMES[hand].removeprefix("hand-")
+        assert {PART_NAMES[part] for part in forearm} == {
+            f"lower-arm-{side}-{face}" for face in ("inner", "outer")
+        }
