@@ -120,10 +120,7 @@ def _look_for_strands(source: Source) -> Strands | None:
     box = bounding_box(keep_parts(source.iuv, PART_GROUPS["head"]))
     if alpha is None or not box.area:
         return None
-    room = round(box.height * NEAR_SHARE)
-    near = np.s_[
-        max(0, box.top - room) : box.bottom + room, max(0, box.left - room) : box.right + room
-    ]
+    near = box.grown(round(box.height * NEAR_SHARE)).slices
     iuv = source.iuv[near]
     body = occupancy(iuv) > 0
     away, nearest = nearest_pixels(body)

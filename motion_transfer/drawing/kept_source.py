@@ -32,6 +32,7 @@ from motion_transfer.drawing.engines.interface import FeatureMap
 from motion_transfer.drawing.source import Source, SourcePicture
 from motion_transfer.drawing.textures import pick_nearest, shrink_texture
 from motion_transfer.errors import InputError, first_line
+from motion_transfer.media.alpha import add_alpha
 from motion_transfer.media.files import check_readable
 from motion_transfer.media.pictures.photo import decode_png, encode_png
 from motion_transfer.media.structured import parse_json, shown
@@ -274,5 +275,5 @@ def _read_texture(
 
 
 def _pack(colours: UInt8[np.ndarray, "H W 3"], alpha: UInt8[np.ndarray, "H W"] | None) -> bytes:
-    pixels = colours if alpha is None else np.dstack([colours, alpha])
+    pixels = colours if alpha is None else add_alpha(colours, alpha)
     return encode_png(pixels, compression=COMPRESSION)

@@ -45,17 +45,14 @@ def clearance_of(
     if not box.area:
         return unknown
     side = max(box.width, box.height)
-    room = round(side * ROOM_SHARE)
-    near = np.s_[
-        max(0, box.top - room) : box.bottom + room, max(0, box.left - room) : box.right + room
-    ]
+    near = box.grown(round(side * ROOM_SHARE)).slices
     shrink = min(1, WORKING_SIDE / side)
-    own = _shrink(iuv[near], shrink, cv2.INTER_NEAREST_EXACT)
+    own = shrink_image(iuv[near], shrink, cv2.INTER_NEAREST_EXACT)
     if alpha is None:
-        rgb = _shrink(photo.rgb[near], shrink, cv2.INTER_AREA)
+        rgb = shrink_image(photo.rgb[near], shrink, cv2.INTER_AREA)
         alpha = stand_out(rgb, occupancy(own), side * shrink)
     else:
-        alpha = _shrink(alpha[near], shrink, cv2.INTER_AREA)
+        alpha = shrink_image(alpha[near], shrink, cv2.INTER_AREA)
     if alpha is None:
         return unknown
     clearance, measured = measure_clearance(own, alpha)
@@ -135,9 +132,10 @@ def measure_clearance(
     return np.where(outline, total / np.maximum(weight, 1e-6), 0).astype(np.float32), outline
 
 
-def _shrink(
+def shrink_image(
     image: UInt8[np.ndarray, "*shape"], factor: float, interpolation: int
 ) -> UInt8[np.ndarray, "*shape"]:
+    """Make an image smaller, at least 1 x 1; contiguous in any case."""
     if factor == 1:
         return np.ascontiguousarray(image)
     size = max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor))

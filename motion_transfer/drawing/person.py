@@ -58,6 +58,11 @@ class Box:
         """Rows and columns, to index an array with."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
+    def grown(self, room: int) -> Box:
+        """Take so many pixels around it as well, which may lie beyond the frame's far edges."""
+        left, top = max(0, self.left - room), max(0, self.top - room)
+        return Box(left, top, self.right + room, self.bottom + room)
+
     def overlap(self, other: Box) -> float:
         """Measure the intersection over union, 0..1."""
         width = min(self.right, other.right) - max(self.left, other.left)

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
-from motion_transfer.drawing.outline import clearance_of
+from motion_transfer.drawing.outline import clearance_of, shrink_image
 from motion_transfer.drawing.person import (
     COVERS,
     bounding_box,
@@ -298,21 +298,16 @@ def _cut_to_unfold(
     alpha = photo.cutout if picture.alpha is None else picture.alpha
     box = bounding_box(iuv)
     # nothing farther away is looked at: of a large photo that saves most of the work
-    margin = round((box.height - 1) * SURROUNDINGS_SHARE)
-    body = np.s_[
-        max(0, box.top - margin) : box.bottom + margin,
-        max(0, box.left - margin) : box.right + margin,
-    ]
+    body = box.grown(round((box.height - 1) * SURROUNDINGS_SHARE)).slices
     rgb, iuv, alpha = photo.rgb[body], iuv[body], None if alpha is None else alpha[body]
     every = max(1, box.height // MEASURED_HEIGHT)
     density = pixels_per_texel(iuv[::every, ::every]) * every * CLEARANCE_SIZE / texture_size
-    scale = max(MOST_PIXELS_PER_TEXEL / density, LEAST_HEIGHT / box.height)
-    if scale < 1:
-        size = max(1, round(rgb.shape[1] * scale)), max(1, round(rgb.shape[0] * scale))
-        rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
-        iuv = cv2.resize(iuv, size, interpolation=cv2.INTER_NEAREST_EXACT)
-        alpha = None if alpha is None else cv2.resize(alpha, size, interpolation=cv2.INTER_AREA)
-    return np.ascontiguousarray(rgb), np.ascontiguousarray(iuv), alpha
+    scale = min(1.0, max(MOST_PIXELS_PER_TEXEL / density, LEAST_HEIGHT / box.height))
+    return (
+        shrink_image(rgb, scale, cv2.INTER_AREA),
+        shrink_image(iuv, scale, cv2.INTER_NEAREST_EXACT),
+        None if alpha is None else shrink_image(alpha, scale, cv2.INTER_AREA),
+    )
 
 
 def read_person(

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, Int64, Shaped
+from jaxtyping import Float32, Int64, Shaped, UInt8
 
 from nhrr_core import load_uv_tables
 
@@ -85,24 +85,48 @@ def pick_nearest(values: Shaped[np.ndarray, "*C t t"], size: int) -> Shaped[np.n
     return values[..., at[:, None], at]
 
 
-def differ_in_any_light(
-    colours: Float32[np.ndarray, "3 N"],
-    of: Float32[
-        np.ndarray,
-        (
-            3  # N
-        ),
-    ],
-    shades: tuple[float, float],
-) -> Float32[np.ndarray, " N"]:
-    """Tell how far colours are from others, 0 to 1, in the light that makes them most alike.
+def lay_out_body(size: int) -> tuple[UInt8[np.ndarray, " L"], Float32[np.ndarray, "3 L"]]:
+    """Tell the part of each texel of a texture of that side, and where it is, metres."""
+    tables = load_uv_tables()
+    position = pick_nearest(tables.position.transpose(2, 0, 1), size)
+    return pick_nearest(tables.part, size).reshape(-1), position.reshape(3, -1)
+
+
+def weigh_nearest(away: Float32[np.ndarray, "M K"], reach: float) -> Float32[np.ndarray, "M K"]:
+    """Weigh points by how much farther than the nearest, the first, they are: a sum of 1 each.
 
     Args:
-        shades: The least and the most light, in that of the colours themselves.
-    Returns: The difference in the channel that differs most.
+        reach: So much farther, a point counts 1 / e as much.
+    """
+    weights = np.exp((away[:, :1] - away) / reach)
+    return weights / weights.sum(1, keepdims=True)
+
+
+def light_between(
+    colours: Float32[np.ndarray, "3 N *M"],
+    of: Float32[np.ndarray, "3 _ *_"],
+    shades: tuple[float, float],
+) -> Float32[np.ndarray, " N *M"]:
+    """Find the light in which colours are most like others, 0 to 1 each.
+
+    Args:
+        of: The others, as many or to be broadcast.
+        shades: The least and the most light, in that of the others.
     """
     light = (colours * of).sum(0) / np.maximum((of * of).sum(0), np.float32(1e-4))
-    return np.abs(colours - of * light.clip(*shades)).max(0)
+    return light.clip(*shades)
+
+
+def differ_in_any_light(
+    colours: Float32[np.ndarray, "3 N *M"],
+    of: Float32[np.ndarray, "3 _ *_"],
+    shades: tuple[float, float],
+) -> Float32[np.ndarray, " N *M"]:
+    """Tell how far colours are from others, 0 to 1, see `light_between`.
+
+    Returns: The difference in the channel that differs most.
+    """
+    return np.abs(colours - of * light_between(colours, of, shades)).max(0)
 
 
 def fall(values: Float32[np.ndarray, "*S"], first: float, last: float) -> Float32[np.ndarray, "*S"]:

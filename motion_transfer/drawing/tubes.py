@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float32, Int64
 
-from motion_transfer.drawing.textures import pick_nearest
-from nhrr_core import load_uv_tables
+from motion_transfer.drawing.textures import lay_out_body
 
 CELL_METRES = 0.005  # about a texel of the layout
 STEEP = 3  # a cell without a texel takes one beside it rather than one above or below
@@ -37,9 +36,7 @@ class Tube:
 @lru_cache(maxsize=2)
 def unroll_body(size: int) -> list[Tube]:
     """Unroll torso and thighs of a texture of that side."""
-    tables = load_uv_tables()
-    part = pick_nearest(tables.part, size).reshape(-1)
-    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1)
+    part, position = lay_out_body(size)
     torso = np.isin(part, TORSO) & (position[1] < SHOULDER_METRES)
     thighs = [np.isin(part, parts) for parts in THIGHS]
     return [_unroll(np.flatnonzero(own), position) for own in (torso, *thighs)]

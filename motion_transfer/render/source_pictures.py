@@ -18,7 +18,6 @@ from motion_transfer.drawing.kept_source import load_picture
 from motion_transfer.drawing.moments import Moments
 from motion_transfer.drawing.person import (
     COVERS,
-    Box,
     Follower,
     Person,
     bounding_box,
@@ -239,11 +238,10 @@ def _read_along(
 def _cut(picture: SourcePicture) -> SourcePicture:
     """Keep of a picture what lies around its person: a video's frames may be large."""
     box = bounding_box(picture.iuv)
-    room = round(max(box.width, box.height) * ROOM_SHARE)
-    near = Box(max(0, box.left - room), max(0, box.top - room), box.right + room, box.bottom + room)
+    near = box.grown(round(max(box.width, box.height) * ROOM_SHARE)).slices
 
     def part(image: UInt8[np.ndarray, "H W *C"]) -> UInt8[np.ndarray, "h w *C"]:
-        return image[near.slices].copy()
+        return image[near].copy()
 
     photo, alpha = picture.photo, picture.alpha
     return replace(

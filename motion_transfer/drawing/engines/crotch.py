@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float32, Int64
 
 from motion_transfer.drawing.engines.interface import Guess
-from motion_transfer.drawing.textures import fall, pick_nearest
+from motion_transfer.drawing.textures import fall, lay_out_body, weigh_nearest
 from motion_transfer.media.nearest import nearest_points
-from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core import PART_GROUPS
 
 TOP_METRES = -0.19  # see `UVTables.position`; legs begin 5 cm lower
 FADE_METRES = 0.03  # from there downwards: the guess of the belly goes over into it
@@ -34,8 +34,7 @@ def clothe_crotch(guess: Guess) -> None:
     if not len(near):
         return
     away, index = nearest_points(position[near], position[texels], NEIGHBOURS)
-    weights = np.exp((away[:, :1] - away) / FALL_METRES)
-    weights /= weights.sum(1, keepdims=True)
+    weights = weigh_nearest(away, FALL_METRES)
     texture, colours = (each.reshape(len(each), -1) for each in (guess.texture, guess.colours))
     change = (texture[:, near[index]] * weights).sum(2) - colours[:, texels]
     share = hidden[texels] * (1 - fall(np.abs(change).mean(0), ALIKE, APART))
@@ -49,9 +48,8 @@ def _find_crotch(
     size: int,
 ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " M"], Float32[np.ndarray, "L 3"]]:
     """Find the crotch's texels and those near it of trunk and thighs, and where all are, metres."""
-    tables = load_uv_tables()
-    part = pick_nearest(tables.part, size).reshape(-1)
-    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1).T
+    part, position = lay_out_body(size)
+    position = position.T
     height = position[:, 1]
     trunk = np.isin(part, PART_GROUPS["torso"])
     crotch = trunk & (height < TOP_METRES)

@@ -15,9 +15,14 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int64
 
 from motion_transfer.drawing.engines.interface import Guess
-from motion_transfer.drawing.textures import differ_in_any_light, fall, pick_nearest
+from motion_transfer.drawing.textures import (
+    differ_in_any_light,
+    fall,
+    lay_out_body,
+    light_between,
+)
 from motion_transfer.media.nearest import nearest_points
-from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core import PART_GROUPS
 
 LIMBS = (
     (0, ("upper-arms", "lower-arms")),
@@ -30,7 +35,8 @@ EVERY, AROUND = 4, 20  # of the seen texels every fourth, of these the nearest: 
 BLUNT_METRES = 0.01  # added to their distance, by whose square they count less
 FEWEST = 25  # texels that are seen, of those; fewer tell nothing
 FARTHEST_METRES = 0.06  # along the limb: what is seen farther off may be another garment
-PLAIN, PATTERNED = 0.08, 0.12  # of 1: how far these differ from their mean, in any light
+ANY_LIGHT = (0.5, 2.0)  # of these, in that of their mean
+PLAIN, PATTERNED = 0.08, 0.12  # of 1: how far they differ from it then
 LIGHT = (0.75, 1.15)  # the guess's, in that of what is seen around it
 ALIKE, APART = 0.04, 0.1  # of 1, in that light: the guess stays; it is another thing
 
@@ -63,8 +69,7 @@ def go_around_limbs(guess: Guess) -> None:
         texels = limb.texels[asked]
         around, told = _average_around(limb, seen, asked, to_levels(texture[:, limb.texels[seen]]))
         own = to_levels(colours[:, texels])
-        light = (own * around).sum(0) / np.maximum((around * around).sum(0), np.float32(1e-4))
-        change = around * light.clip(*LIGHT) - own
+        change = around * light_between(own, around, LIGHT) - own
         share = hidden[texels] * told * (1 - fall(np.abs(change).max(0), ALIKE, APART))
         colours[:, texels] += 2 * change * share
 
@@ -92,9 +97,7 @@ def _average_around(
     weights /= weights.sum(1, keepdims=True)
     near = levels[:, index]
     means = (near * weights).sum(2)
-    alike = np.broadcast_to(means[..., None], near.shape)
-    apart = differ_in_any_light(near.reshape(3, -1), alike.reshape(3, -1), (0.5, 2.0))
-    variety = (apart.reshape(away.shape) * weights).sum(1)
+    variety = (differ_in_any_light(near, means[..., None], ANY_LIGHT) * weights).sum(1)
     gap = np.abs(known[index[:, 0], limb.axis] - wanted[:, limb.axis]) / ALONG
     return means, fall(variety, PLAIN, PATTERNED) * (gap < FARTHEST_METRES)
 
@@ -102,9 +105,7 @@ def _average_around(
 @lru_cache(maxsize=2)
 def find_limbs(size: int) -> list[Limb]:
     """Find the arms and legs of a texture of that side."""
-    tables = load_uv_tables()
-    part = pick_nearest(tables.part, size).reshape(-1)
-    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1)
+    part, position = lay_out_body(size)
     found = []
     for axis, groups in LIMBS:
         own = np.isin(part, [each for group in groups for each in PART_GROUPS[group]])

@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float32, Int64
 
 from motion_transfer.drawing.engines.interface import Guess
-from motion_transfer.drawing.textures import fall, pick_nearest
+from motion_transfer.drawing.textures import fall, lay_out_body, weigh_nearest
 from motion_transfer.media.nearest import nearest_points
-from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core import PART_GROUPS
 
 LOWEST, HIGHEST = 0.22, 0.32  # metres; see `UVTables.position`
 HALF_WIDTH_METRES = (0.015, 0.03)  # up to the former a gap is closed, from the latter on it is none
@@ -35,8 +35,7 @@ def close_neck(guess: Guess) -> None:
     away, index = nearest_points(position[seen], position[gap], AROUND)
     steps = position[seen][index] - position[gap][:, None]
     share = fall(away[:, 0], *HALF_WIDTH_METRES) * fall(_lean(steps), *ONE_SIDED) * hidden[gap]
-    weights = np.exp((away[:, :1] - away) / FALL_METRES)
-    weights /= weights.sum(1, keepdims=True)
+    weights = weigh_nearest(away, FALL_METRES)
     texture, colours = (each.reshape(len(each), -1) for each in (guess.texture, guess.colours))
     mean = (texture[:, texels[seen][index]] * weights).sum(2)
     colours[:, texels[gap]] += (mean - colours[:, texels[gap]]) * share
@@ -53,9 +52,8 @@ def _lean(steps: Float32[np.ndarray, "N K 3"]) -> Float32[np.ndarray, " N"]:
 @lru_cache(maxsize=2)
 def _find_base(size: int) -> tuple[Int64[np.ndarray, " N"], Float32[np.ndarray, "N 3"]]:
     """Find the texels around the neck's base, and where they are, metres."""
-    tables = load_uv_tables()
-    part = pick_nearest(tables.part, size).reshape(-1)
-    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1).T
+    part, position = lay_out_body(size)
+    position = position.T
     own = np.isin(part, PART_GROUPS["head"] + PART_GROUPS["torso"])
     own &= (position[:, 1] > LOWEST) & (position[:, 1] < HIGHEST)
     return np.flatnonzero(own), np.ascontiguousarray(position[own])

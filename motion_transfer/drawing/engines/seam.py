@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float32, Int64
 
 from motion_transfer.drawing.engines.interface import Guess
-from motion_transfer.drawing.textures import fall, pick_nearest
+from motion_transfer.drawing.textures import fall, lay_out_body
 from motion_transfer.media.nearest import nearest_points
-from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core import PART_GROUPS
 
 REACH_METRES = 0.08  # from the cut, to either side
 MIDDLE = 0.3  # of the layout, from its left: left of it lies the right half of torso and head
@@ -36,9 +36,7 @@ def _find_cut(
     size: int,
 ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float32[np.ndarray, " N"]]:
     """Find the texels beside the cut, their mirror images, and how near it they are, 0 to 1."""
-    tables = load_uv_tables()
-    position = pick_nearest(tables.position.transpose(2, 0, 1), size).reshape(3, -1)
-    part = pick_nearest(tables.part, size).reshape(-1)
+    part, position = lay_out_body(size)
     nearness = fall(np.abs(position[0]), 0, REACH_METRES) * fall(position[2], *BEHIND_METRES)
     nearness *= np.isin(part, PART_GROUPS["torso"] + PART_GROUPS["head"])
     texels = np.flatnonzero(nearness)

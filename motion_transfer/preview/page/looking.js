@@ -87,6 +87,6 @@ export class Looking extends EventTarget {
 
   clamp(frame) {
     if (!this.count) return this.frame; // that of a motion which is not there at the moment
-    return Math.max(0, Math.min(Math.round(frame) || 0, Math.max(this.count - 1, 0)));
+    return Math.max(0, Math.min(Math.round(frame) || 0, this.count - 1));
   }
 }
