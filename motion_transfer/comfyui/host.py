@@ -8,18 +8,28 @@ from __future__ import annotations
 import logging
 import os
 from importlib import import_module
+from mimetypes import guess_type
 from pathlib import Path
 from typing import Any
 
 from motion_transfer.errors import InputError
 from motion_transfer.events import Event, FramesDone, Notice, Stage
-from motion_transfer.media.iuv.formats import names_file
+from motion_transfer.extras import missing_packages
+from motion_transfer.media.iuv.formats import iuv_suffixes, names_file
+from motion_transfer.media.pictures.formats import PHOTO_SUFFIXES
 from motion_transfer.media.unchanged import status_key
+from motion_transfer.preview.choices import FIRST_MOTION, FIRST_PERSON
 from motion_transfer.render.inputs import CAPTURED
+from motion_transfer.render.options import is_kept
 from motion_transfer.weights import SHIPPED, find_weights
 
 OWN_FOLDER = "motion_transfer"
 """Below ComfyUI's folders of models and of temporary files."""
+NOTHING = "nothing"
+"""The name of a file where a node takes what is connected."""
+EXAMPLE_PERSON, EXAMPLE_DANCE = "Example person", "Example dance"
+EXAMPLES = {EXAMPLE_PERSON: FIRST_PERSON, EXAMPLE_DANCE: FIRST_MOTION}
+"""What comes with the package, so that a first workflow runs without a file of one's own."""
 
 LOG = logging.getLogger(__name__)
 
@@ -40,6 +50,49 @@ class Progress:
             LOG.warning(event.message)
 
 
+def list_sources() -> list[str]:
+    """List what lies in ComfyUI's input folder and may show a person, and the example."""
+    iuv = tuple(f"_iuv{suffix}" for suffix in iuv_suffixes())
+    return [
+        NOTHING,
+        *(
+            file.name
+            for file in _list_input()
+            if (_shows_something(file) or is_kept(file)) and not file.name.lower().endswith(iuv)
+        ),
+        EXAMPLE_PERSON,
+    ]
+
+
+def list_drivers() -> list[str]:
+    """List what lies in ComfyUI's input folder and may move, and the motions that are built in."""
+    arrays = iuv_suffixes(several=True)
+    given = [
+        f"people:{file.name}" if file.suffix.lower() == CAPTURED else file.name
+        for file in _list_input()
+        if _shows_something(file) or file.suffix.lower() in (*arrays, CAPTURED)
+    ]
+    if missing_packages("people"):
+        return [NOTHING, *given, EXAMPLE_DANCE]
+    from motion_transfer.people import MOTIONS
+
+    return [NOTHING, *given, EXAMPLE_DANCE, *(f"people:{name}" for name in MOTIONS)]
+
+
+def _list_input() -> list[Path]:
+    """List the files and folders of the input folder, by name; not those of its folders."""
+    entries = Path(_folders().get_input_directory()).iterdir()
+    return sorted(entry for entry in entries if not entry.name.startswith("."))
+
+
+def _shows_something(file: Path) -> bool:
+    """Tell by its name whether it is a picture or a video; any folder may hold pictures."""
+    if file.suffix.lower() in PHOTO_SUFFIXES or file.is_dir():
+        return True
+    kind, _ = guess_type(file.name)
+    return kind is not None and kind.startswith("video/")
+
+
 def find_input(name: str) -> Path:
     """Find what a node names, below ComfyUI's input folder, or a motion such as `people:walk`.
 
@@ -47,6 +100,8 @@ def find_input(name: str) -> Path:
     the input folder, which its owner has put there, may lead elsewhere.
     Raises: InputError.
     """
+    if name in EXAMPLES:
+        return EXAMPLES[name]
     if not names_file(name):
         scheme, _, motion = name.partition(":")
         captured, comma, settings = motion.partition(",")
@@ -77,6 +132,8 @@ def key_of_input(name: str) -> str:
     try:
         if not name:
             return ""
+        if name in EXAMPLES:
+            return name
         motion = name.partition(":")[2].partition(",")[0]
         if not names_file(name) and Path(motion).suffix.lower() != CAPTURED:
             return name

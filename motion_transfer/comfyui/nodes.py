@@ -6,6 +6,7 @@ encoded once, however many drivers and options are tried.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,7 @@ SIZES = ("driver", "crop", "even")
 ESTIMATOR = "What finds people in pictures; the heavy model is nearer, and slower."
 WHO = "largest, an index from the left (0 first), or a box x0,y0,x1,y1 in pixels."
 IN_INPUT = "in ComfyUI's input folder"
+UNLISTED = "What the list lacks, instead of it: a file further down, or people:walk,azimuth=30."
 
 Inputs = dict[str, dict[str, tuple[Any, ...]]]
 
@@ -68,15 +70,18 @@ class Encoded:
 
 
 class _FileNode:
-    """A node that may name a file of the input folder: checked before it runs, known by content."""
+    """A node that may name a file of the input folder: checked before it runs, known by content.
+
+    Its list is no limit: what is unlisted, or was there when the page was loaded, is looked for.
+    """
 
     @classmethod
-    def VALIDATE_INPUTS(cls, file: str) -> bool | str:
-        return host.explain(file)
+    def VALIDATE_INPUTS(cls, file: str, unlisted: str = "") -> bool | str:
+        return host.explain(_named(file, unlisted))
 
     @classmethod
-    def IS_CHANGED(cls, file: str, **_others: Any) -> str:
-        return host.key_of_input(file)
+    def IS_CHANGED(cls, file: str, unlisted: str = "", **_others: Any) -> str:
+        return host.key_of_input(_named(file, unlisted))
 
 
 class LoadSource(_FileNode):
@@ -95,7 +100,11 @@ class LoadSource(_FileNode):
     def INPUT_TYPES(cls) -> Inputs:
         return {
             "required": {
-                "file": _text("", f"A file {IN_INPUT}; empty where an image is connected."),
+                "file": _choice(
+                    host.list_sources(),
+                    f"What lies {IN_INPUT}; {host.NOTHING} where an image is connected.",
+                    image_upload=True,
+                ),
                 "person": _text("largest", f"Whom: {WHO}"),
             },
             "optional": {
@@ -105,6 +114,7 @@ class LoadSource(_FileNode):
                 ),
                 "iuv": _socket("IMAGE", "The photo's IUV: I, U and V as red, green and blue."),
                 "estimator": _choice(landmark_estimators(), ESTIMATOR),
+                "unlisted": _text("", UNLISTED),
             },
         }
 
@@ -116,13 +126,15 @@ class LoadSource(_FileNode):
         mask: Tensor | None = None,
         iuv: Tensor | None = None,
         estimator: str = "blazepose",
+        unlisted: str = "",
     ) -> tuple[Photograph]:
-        if (image is None) == (not file):
+        name = _named(file, unlisted)
+        if (image is None) == (not name):
             raise InputError("a source is an image or a file; connect the one, or name the other")
         if image is None:
             if mask is not None or iuv is not None:
                 raise InputError("mask and iuv belong to an image; connect that, or leave them out")
-            return (Photograph(host.find_input(file), None, person, estimator),)
+            return (Photograph(host.find_input(name), None, person, estimator),)
         body = None if iuv is None else to_pictures(iuv[:1])[0]
         return (Photograph(to_photo(image, mask), body, person, estimator),)
 
@@ -195,7 +207,11 @@ class LoadDriver(_FileNode):
     def INPUT_TYPES(cls) -> Inputs:
         return {
             "required": {
-                "file": _text("", f"A file {IN_INPUT}; empty where IUV is connected."),
+                "file": _choice(
+                    host.list_drivers(),
+                    f"What lies {IN_INPUT}; {host.NOTHING} where IUV is connected.",
+                    video_upload=True,
+                ),
                 "person": _text("largest", f"Whom to follow: {WHO}"),
                 "frames": _text("", "Only these, A:B, counted from 0, B excluded; empty: all."),
                 "missing": _choice(("auto", *MISSING), "Of frames that show nobody."),
@@ -203,6 +219,7 @@ class LoadDriver(_FileNode):
             "optional": {
                 "iuv": _socket("IMAGE", "IUV frames, as Estimate IUV gives them."),
                 "estimator": _choice(landmark_estimators(), ESTIMATOR),
+                "unlisted": _text("", UNLISTED),
             },
         }
 
@@ -214,10 +231,12 @@ class LoadDriver(_FileNode):
         missing: str,
         iuv: Tensor | None = None,
         estimator: str = "blazepose",
+        unlisted: str = "",
     ) -> tuple[Motion]:
-        if (iuv is None) == (not file):
+        name = _named(file, unlisted)
+        if (iuv is None) == (not name):
             raise InputError("a driver is IUV or a file; connect the one, or name the other")
-        motion = host.find_input(file) if iuv is None else to_pictures(iuv)
+        motion = host.find_input(name) if iuv is None else to_pictures(iuv)
         shown = None if missing == "auto" else missing
         return (Motion(motion, person, shown, frames, estimator),)
 
@@ -351,8 +370,15 @@ def _text(default: str, tooltip: str) -> tuple[str, dict[str, Any]]:
     return "STRING", {"default": default, "tooltip": tooltip}
 
 
-def _choice(values: tuple[str, ...], tooltip: str) -> tuple[list[str], dict[str, Any]]:
-    return list(values), {"tooltip": tooltip}
+def _choice(
+    values: Iterable[str], tooltip: str, **settings: bool
+) -> tuple[list[str], dict[str, Any]]:
+    return list(values), {"tooltip": tooltip, **settings}
+
+
+def _named(file: str, unlisted: str) -> str:
+    """Take what is named, from the list or beside it; empty where nothing is."""
+    return unlisted or ("" if file == host.NOTHING else file)
 
 
 def _make_batch(count: int, height: int, width: int) -> tuple[Tensor, Tensor]:

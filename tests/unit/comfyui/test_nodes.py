@@ -16,14 +16,15 @@ import torch
 from comfyui_host import ComfyUI, InterruptedRunError
 from PIL import Image
 
-from motion_transfer import comfyui, demo
+from motion_transfer import comfyui
 from motion_transfer.comfyui import NODE_CLASS_MAPPINGS, NODE_DISPLAY_NAME_MAPPINGS, host, nodes
 from motion_transfer.comfyui.tensors import to_bytes
 from motion_transfer.errors import InputError
 from motion_transfer.render.memory import MotionTransfer
 
 HERE = Path(comfyui.__path__[0])
-WORKFLOW = HERE / "workflows" / "dance.json"
+WORKFLOW = HERE / "dance_api.json"
+ON_THE_PAGE = HERE / "example_workflows" / "dance.json"
 
 
 @pytest.fixture
@@ -42,7 +43,9 @@ def small(studio, comfy: ComfyUI, checkpoint: Path) -> dict[str, Any]:
     for path in (photo, photo.with_name("source_IUV.png"), studio.video(5)):
         path.rename(comfy.input / path.name)
     (comfy.models / "motion_transfer" / "tiny.safetensors").symlink_to(checkpoint)
-    workflow["4"]["inputs"]["weights"] = "tiny.safetensors"
+    workflow["1"]["inputs"]["file"] = "source.png"
+    workflow["2"]["inputs"]["weights"] = "tiny.safetensors"
+    workflow["3"]["inputs"]["file"] = "driver.mkv"
     return workflow
 
 
@@ -60,7 +63,7 @@ def numbered(folder: Path) -> np.ndarray:
 
 def test_the_workflow_that_ships_runs(comfy: ComfyUI, small: dict[str, Any]) -> None:
     outputs = comfy.run(small)
-    images, masks, rate = outputs["6"]
+    images, masks, rate = outputs["5"]
     assert images.shape == (5, 96, 64, 3)
     assert masks.shape == (5, 96, 64)
     assert rate == pytest.approx(30000 / 1001)
@@ -72,19 +75,70 @@ def test_the_workflow_that_ships_runs(comfy: ComfyUI, small: dict[str, Any]) -> 
     assert [5, 5] in comfy.bars
 
 
-def test_it_names_what_it_needs_of_the_demo(comfy: ComfyUI) -> None:
-    """As the documentation says: the demo's files go into the input folder."""
-    folder = Path(demo.__path__[0])
-    named = [
-        n["inputs"].get("image") or n["inputs"].get("file")
-        for n in json.loads(WORKFLOW.read_text()).values()
-    ]
-    files = [name for name in named if isinstance(name, str) and name]
-    assert len(files) == 3
-    assert all((folder / name).is_file() for name in files)
-    assert comfy.kinds.keys() >= {
-        n["class_type"] for n in json.loads(WORKFLOW.read_text()).values()
+def test_it_needs_no_file_of_ones_own(comfy: ComfyUI) -> None:
+    """What the workflow names comes with the package, and is on the nodes' lists."""
+    workflow = json.loads(WORKFLOW.read_text())
+    for number in ("1", "3"):
+        kind = comfy.kinds[workflow[number]["class_type"]]
+        name = workflow[number]["inputs"]["file"]
+        assert name in kind.INPUT_TYPES()["required"]["file"][0]
+        assert host.find_input(name).is_file()
+        assert host.key_of_input(name) == name
+    assert comfy.kinds.keys() >= {node["class_type"] for node in workflow.values()}
+
+
+def test_the_page_shows_the_same_workflow(comfy: ComfyUI) -> None:
+    """ComfyUI's list of templates takes its page's format alone, and a picture beside it."""
+    page = json.loads(ON_THE_PAGE.read_text())
+    links = {number: [str(source), slot] for number, source, slot, *_ in page["links"]}
+    workflow = json.loads(WORKFLOW.read_text())
+    assert {str(node["id"]): node["type"] for node in page["nodes"]} == {
+        number: node["class_type"] for number, node in workflow.items()
     }
+    for node in page["nodes"]:
+        inputs = workflow[str(node["id"])]["inputs"]
+        linked = {i["name"]: links[i["link"]] for i in node["inputs"] if i["link"] is not None}
+        assert linked == {name: v for name, v in inputs.items() if isinstance(v, list)}
+        if not hasattr(kind := comfy.kinds[node["type"]], "INPUT_TYPES"):
+            continue
+        widgets = [
+            name
+            for group in kind.INPUT_TYPES().values()
+            for name, (wanted, _) in group.items()
+            if isinstance(wanted, list) or wanted in ("STRING", "BOOLEAN", "FLOAT")
+        ]
+        shown = dict(zip(widgets, node["widgets_values"], strict=False))
+        assert shown.items() >= {k: v for k, v in inputs.items() if k not in linked}.items()
+    with Image.open(ON_THE_PAGE.with_suffix(".jpg")) as picture:
+        assert picture.size == (480, 320)
+
+
+def test_the_lists_are_what_lies_in_the_input_folder(comfy: ComfyUI) -> None:
+    usable = ("me.png", "me_IUV.png", "me.mtsource", "clip.mp4", "walk.bvh", "body.npy")
+    for name in (*usable, "notes.txt", ".hidden.png"):
+        (comfy.input / name).touch()
+    (comfy.input / "album").mkdir()
+    [sources, uploads], [drivers, _] = (
+        node.INPUT_TYPES()["required"]["file"] for node in (nodes.LoadSource, nodes.LoadDriver)
+    )
+    assert sources == ["nothing", "album", "clip.mp4", "me.mtsource", "me.png", "Example person"]
+    assert uploads["image_upload"]
+    given = ["album", "body.npy", "clip.mp4", "me.png", "me_IUV.png", "people:walk.bvh"]
+    assert drivers[:8] == ["nothing", *given, "Example dance"]
+    assert "people:walk" in drivers
+
+
+def test_what_is_unlisted_counts_instead(comfy: ComfyUI) -> None:
+    (comfy.input / "album").mkdir()
+    (comfy.input / "album" / "me.png").touch()
+    chosen = ("nothing", "album/me.png")
+    assert nodes.LoadSource.VALIDATE_INPUTS(*chosen) is True
+    assert nodes.LoadSource.IS_CHANGED(*chosen, person="largest") == host.key_of_input(chosen[1])
+    [source] = nodes.LoadSource().load("Example person", "largest", unlisted="album/me.png")
+    assert source.photo == comfy.input / "album" / "me.png"
+    walk = "people:walk,azimuth=30"
+    [driver] = nodes.LoadDriver().load("nothing", "largest", "", "auto", unlisted=walk)
+    assert driver.frames == Path(walk)
 
 
 def test_a_person_is_encoded_once(
@@ -95,9 +149,9 @@ def test_a_person_is_encoded_once(
         MotionTransfer, "encode", lambda *a, **k: calls.append(1) or encode(*a, **k)
     )
     comfy.run(small)
-    small["5"]["inputs"]["frames"] = "1:3"
-    assert len(comfy.run(small)["6"][0]) == 2
-    small["6"]["inputs"]["shadow"] = False
+    small["3"]["inputs"]["frames"] = "1:3"
+    assert len(comfy.run(small)["5"][0]) == 2
+    small["5"]["inputs"]["shadow"] = False
     comfy.run(small)
     assert comfy.runs.count("MotionTransferRender") == 3
     assert (len(calls), comfy.runs.count("MotionTransferEncode")) == (1, 1)
@@ -114,9 +168,9 @@ def test_image_and_mask_are_those_of_mt_run(
     words = (*given(comfy), "-o", out, "--weights", checkpoint)
     told = mt("run", *words, "--background", "transparent", *(["--shadow"] if shadow else []))
     assert told.code == 0, told.err
-    small["6"]["inputs"]["shadow"] = shadow
-    del small["6"]["inputs"]["background"], small["7"]
-    images, masks, _ = comfy.run(small)["6"]
+    small["5"]["inputs"]["shadow"] = shadow
+    del small["5"]["inputs"]["background"], small["4"]
+    images, masks, _ = comfy.run(small)["5"]
     rgba = numbered(out)
     np.testing.assert_array_equal(to_bytes(masks), rgba[..., 3])
     np.testing.assert_array_equal(to_bytes(images), rgba[..., :3])
@@ -128,13 +182,13 @@ def test_over_a_background_it_is_what_mt_run_lays_there(
     out = studio.folder / "out"
     words = (*given(comfy), "-o", out, "--weights", checkpoint)
     assert mt("run", *words, "--background", "#f0f0f0").code == 0
-    small["6"]["inputs"]["shadow"] = False
-    np.testing.assert_array_equal(to_bytes(comfy.run(small)["6"][0]), numbered(out))
+    small["5"]["inputs"]["shadow"] = False
+    np.testing.assert_array_equal(to_bytes(comfy.run(small)["5"][0]), numbered(out))
 
 
 def test_a_background_plays(comfy: ComfyUI, small: dict[str, Any]) -> None:
-    images = comfy.run(small)["6"]
-    [encoded], [driver] = comfy.run(small)["4"], comfy.run(small)["5"]
+    images = comfy.run(small)["5"]
+    [encoded], [driver] = comfy.run(small)["2"], comfy.run(small)["3"]
     two = torch.stack([torch.zeros(48, 32, 3), torch.ones(48, 32, 3)])
     images, _, _ = nodes.RenderFrames().render(encoded, driver, **PLAIN, background=two)
     assert images[:, 0, 0, 0].tolist() == [0, 1, 0, 1, 0]
@@ -171,8 +225,8 @@ def test_a_mask_is_the_photos_alpha(studio, comfy: ComfyUI) -> None:
 
 
 def test_cancelling_ends_a_render(comfy: ComfyUI, small: dict[str, Any]) -> None:
-    [encoded] = comfy.run(small)["4"]
-    [driver] = comfy.run(small)["5"]
+    [encoded] = comfy.run(small)["2"]
+    [driver] = comfy.run(small)["3"]
     comfy.bars.clear()
     comfy.cancel_after = 5  # the driver is looked through, and two frames are drawn
     with pytest.raises(InterruptedRunError):
@@ -201,6 +255,8 @@ def test_a_source_is_one_thing(comfy: ComfyUI) -> None:
     load = nodes.LoadSource().load
     with pytest.raises(InputError, match="connect the one, or name the other"):
         load("", "largest")
+    with pytest.raises(InputError, match="connect the one, or name the other"):
+        load("nothing", "largest")
     with pytest.raises(InputError, match="connect the one, or name the other"):
         load("me.png", "largest", torch.zeros(1, 8, 8, 3))
 
