@@ -7,6 +7,7 @@ and its conversion to 8 bits darkens by one or two levels, unless it is asked fo
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -15,7 +16,7 @@ import numpy as np
 from av.container import InputContainer
 from av.video.codeccontext import VideoCodecContext
 from av.video.format import VideoFormatComponent
-from av.video.reformatter import ColorTrc, Interpolation, VideoReformatter
+from av.video.reformatter import Interpolation, VideoReformatter
 
 from motion_transfer.media.alpha import (
     ALPHA_MODE,
@@ -30,6 +31,7 @@ from motion_transfer.media.alpha import (
     unpremultiply,
 )
 from motion_transfer.media.container import LARGEST_PICTURE
+from motion_transfer.media.pictures.hdr import HDR, to_sdr
 
 ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
 """What decodes alpha, too, by the codec's name."""
@@ -40,7 +42,6 @@ STRAIGHT_CODECS = ("gif", "png", "apng", "webp", "vp8", "vp9")
 PRECISE = Interpolation.BILINEAR | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
 
 UNSPECIFIED = 2  # H.273's number
-HDR: dict[int, str] = {ColorTrc.SMPTE2084: "PQ", ColorTrc.ARIB_STD_B67: "HLG"}
 
 
 def decode_frames(container: InputContainer, stream: av.VideoStream) -> Iterator[av.VideoFrame]:
@@ -77,8 +78,8 @@ def describe_colours(
     notes = ()
     if transfer := HDR.get(frame.color_trc):
         notes += (
-            f"{path} is HDR ({transfer}); its values are taken as SDR, so that it looks flat, and"
-            " the output is SDR: convert it to BT.709 first for the right colours",
+            f"{path} is HDR ({transfer}); its colours are brought to SDR (BT.709), which the output"
+            " is, too",
         )
     if find_alpha(frame) and not alpha_mode and stream.codec_context.name not in STRAIGHT_CODECS:
         notes += (
@@ -93,7 +94,7 @@ def to_picture(frame: av.VideoFrame, size: tuple[int, int], *, premultiplied: bo
     width, height = size
     part = find_alpha(frame)
     if part is None:
-        if frame.format.components[0].bits <= 8:
+        if frame.format.components[0].bits <= 8 and frame.color_trc not in HDR:
             return Picture(frame.to_ndarray(format="rgb24", width=width, height=height))
         return Picture(_convert(frame, "rgb24", size))
     if frame.format.is_planar:
@@ -110,12 +111,13 @@ def to_picture(frame: av.VideoFrame, size: tuple[int, int], *, premultiplied: bo
 
 
 def _convert(frame: av.VideoFrame, pixel_format: str, size: tuple[int, int]) -> Colours:
-    """Convert without darkening, and the same way every time."""
+    """Convert without darkening, and the same way every time; HDR to SDR."""
     width, height = size
-    converted = VideoReformatter().reformat(
-        frame, width, height, pixel_format, interpolation=PRECISE, threads=1
-    )
-    return converted.to_ndarray()
+    convert = partial(VideoReformatter().reformat, frame, width, height, threads=1)
+    if frame.color_trc in HDR and pixel_format == "rgb24":
+        # in 16 bits FFmpeg is precise by itself, and wrong if it is asked to be
+        return to_sdr(convert("rgb48le").to_ndarray(), frame.color_trc)
+    return convert(pixel_format, interpolation=PRECISE).to_ndarray()
 
 
 def _read_plane(frame: av.VideoFrame, part: VideoFormatComponent) -> Alpha:

@@ -1,4 +1,4 @@
-"""Videos with alpha, and in HDR, that others made."""
+"""Videos with alpha, and of more than 8 bits, that others made."""
 
 from __future__ import annotations
 
@@ -129,37 +129,6 @@ def test_what_is_opaque_is_told_and_read(tmp_path: Path) -> None:
     clip = open_pictures(path)
     assert clip.has_alpha
     np.testing.assert_array_equal(next(clip.read_rgba()), picture())
-
-
-def hdr(path: Path, transfer: int, primaries: int = BT2020) -> Path:
-    with av.open(str(path), "w") as out:
-        stream = out.add_stream("libx265", rate=25, options={"x265-params": "log-level=none"})
-        stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p10le"
-        context = stream.codec_context
-        context.color_primaries = primaries
-        context.colorspace = BT2020 if primaries == BT2020 else BT709
-        context.color_trc = transfer
-        image = np.full((SIZE[1], SIZE[0], 3), (150, 100, 60), np.uint8)
-        frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-        matrix = "BT2020" if primaries == BT2020 else "ITU709"
-        for _ in range(3):
-            out.mux(
-                stream.encode(
-                    frame.reformat(format="yuv420p10le", dst_colorspace=matrix, threads=1)
-                )
-            )
-        out.mux(stream.encode(None))
-    return path
-
-
-@pytest.mark.parametrize(("transfer", "name"), [(PQ, "PQ"), (HLG, "HLG"), (BT709, None)])
-@pytest.mark.parametrize("suffix", [".mp4", ".mkv"])
-def test_hdr_is_told(tmp_path: Path, suffix: str, transfer: int, name: str | None) -> None:
-    primaries = BT2020 if name else BT709
-    clip = open_pictures(hdr(tmp_path / f"a{suffix}", transfer, primaries))
-    notes = [note for note in clip.notes if "HDR" in note]
-    assert (f"is HDR ({name})" in notes[0]) if name else not notes
-    np.testing.assert_allclose(next(clip.read())[30, 40].astype(int), (150, 100, 60), atol=2)
 
 
 def test_10_bits_are_not_darkened(tmp_path: Path) -> None:
