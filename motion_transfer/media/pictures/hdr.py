@@ -35,6 +35,8 @@ LUMINANCE = np.array([[0.2627, 0.6780, 0.0593]])
 LEVELS = 2**16
 STEPS = 2**12
 """Of the root of light, by which SDR's levels are looked up: fine where eyes are."""
+STRIP = 32
+"""Rows that are converted at a time, so that what is in between stays in the processor's cache."""
 
 
 def to_sdr(signal: UInt16[np.ndarray, "H W 3"], transfer: int) -> UInt8[np.ndarray, "H W 3"]:
@@ -44,16 +46,29 @@ def to_sdr(signal: UInt16[np.ndarray, "H W 3"], transfer: int) -> UInt8[np.ndarr
         signal: In the full range of 16 bits.
         transfer: A key of `HDR`.
     """
-    light = cv2.transform(_light_of_levels(transfer)[signal], BT2020_TO_BT709)
-    if HDR[transfer] == "HLG":  # whose displays are brighter where the whole colour is
-        luminance = cv2.transform(light, LUMINANCE @ np.linalg.inv(BT2020_TO_BT709))
-        light *= cv2.pow(np.maximum(luminance, 0), 0.2)[..., None]
-    np.maximum(light, 0, out=light)
+    sdr = np.empty(signal.shape, np.uint8)
+    for top in range(0, len(signal), STRIP):
+        rows = slice(top, top + STRIP)
+        _convert(signal[rows], transfer, sdr[rows])
+    return sdr
+
+
+def _convert(
+    signal: UInt16[np.ndarray, "H W 3"], transfer: int, sdr: UInt8[np.ndarray, "H W 3"]
+) -> None:
+    light = _light_of_levels(transfer).take(signal, mode="clip")
+    linear = np.maximum(cv2.transform(light, BT2020_TO_BT709), 0)
+    red, green, blue = cv2.split(linear)
+    brightest = cv2.max(cv2.max(red, green), blue)
+    if HDR[transfer] == "PQ":
+        factor = _press(brightest)
+    else:  # whose displays show a colour the brighter the brighter it is
+        display = cv2.pow(cv2.transform(light, LUMINANCE), 0.2)
+        factor = _press(brightest * display) * display
     # one factor for all three channels keeps the hue
-    light *= _press(light.max(-1))[..., None]
-    steps = np.sqrt(light, out=light)
-    steps *= STEPS
-    return _levels_of_roots()[np.minimum(steps, STEPS, out=steps).astype(np.uint16)]
+    linear *= cv2.merge([factor * STEPS**2] * 3)
+    roots = np.sqrt(linear, out=linear).astype(np.uint16)
+    _levels_of_roots().take(roots, out=sdr, mode="clip")
 
 
 def _press(brightness: Float32[np.ndarray, "H W"]) -> Float32[np.ndarray, "H W"]:
