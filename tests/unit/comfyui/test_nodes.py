@@ -110,7 +110,7 @@ def test_the_page_shows_the_same_workflow(comfy: ComfyUI) -> None:
         shown = dict(zip(widgets, node["widgets_values"], strict=False))
         assert shown.items() >= {k: v for k, v in inputs.items() if k not in linked}.items()
     with Image.open(ON_THE_PAGE.with_suffix(".jpg")) as picture:
-        assert picture.size == (480, 320)
+        assert picture.size == (360, 240)
 
 
 def test_the_lists_are_what_lies_in_the_input_folder(comfy: ComfyUI) -> None:
