@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float32, UInt8
 
 from motion_transfer.drawing.outline import grab_cut
 from motion_transfer.drawing.person import bounding_box, disc, occupancy
+from motion_transfer.drawing.strands import trim_strands
 from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
 from motion_transfer.drawing.views import HEAD
 from motion_transfer.media.nearest import take_nearest
@@ -40,7 +41,8 @@ def trim(
         alpha: How much of each pixel is the person; None: its colours have to tell.
     """
     trimmed = trim_outline(rgb, iuv) if alpha is None else trim_to_alpha(iuv, alpha)
-    return trim_arms(rgb, trim_around_arms(rgb, trim_head(rgb, trimmed)))
+    trimmed = trim_arms(rgb, trim_around_arms(rgb, trim_head(rgb, trimmed)))
+    return trim_strands(rgb, trimmed)
 
 
 def trim_head(
