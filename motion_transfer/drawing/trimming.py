@@ -23,6 +23,7 @@ CLEAR_SHARE = 0.05  # likewise: hair and loose clothes leave the outline by up t
 TRIM_SHARE = 0.004  # likewise: the width over which a photo mixes person and background
 HEAD_RIM, HEAD_LEVELS = 0.08, 90  # of a head's size, the root of its area; of 255: by eye
 ARM_RIM, ARM_LEVELS = 0.1, 45  # likewise, of a hand's and its forearm's
+FINGER = 0.03  # half as wide, likewise
 STRAY_LEVELS = 20  # likewise, of what has a hand's colour beside it
 TOUCHING = 1 / 3  # of the rim around an arm: there shadows that it casts go as well
 MOUTH_METRES = 0.38  # see `UVTables.position`: higher up hair grows on heads
@@ -72,13 +73,15 @@ def trim_around_arms(
 ) -> UInt8[np.ndarray, "H W 3"]:
     """Take fingers that reach beyond a hand's IUV out of that of the clothes behind them.
 
-    Upper arms stay: below a short sleeve an elbow has the forearm's colour by right.
+    So go clothes between fingers where nothing but slivers is left of them. Upper arms stay: below
+    a short sleeve an elbow has the forearm's colour by right.
     """
     whole_arms = [*ARMS[0], *ARMS[1], *PART_GROUPS["upper-arms"]]
     behind = (iuv[..., 0] > 0) & ~np.isin(iuv[..., 0], whole_arms)
     for parts in ARMS:
         arm = np.isin(iuv[..., 0], parts)
         iuv = iuv * ~find_strays(rgb, arm, behind)[..., None]
+        iuv = iuv * ~find_slivers(arm, behind & (iuv[..., 0] > 0))[..., None]
     return iuv
 
 
@@ -105,6 +108,22 @@ def find_strays(
         shaded = (away <= reach * TOUCHING) & (from_sure > ARM_LEVELS)
         strays[around] = doubted & (alike | shaded)
     return strays
+
+
+def find_slivers(
+    arm: Bool[np.ndarray, "H W"], behind: Bool[np.ndarray, "H W"]
+) -> Bool[np.ndarray, "H W"]:
+    """Mark pixels around an arm where what is behind it is thinner than its fingers."""
+    slivers = np.zeros(arm.shape, bool)
+    if not arm.any():
+        return slivers
+    size = np.count_nonzero(arm) ** 0.5
+    around = _cut_around(arm, math.ceil(2 * ARM_RIM * size))
+    arm, behind = arm[around], behind[around]
+    near = cv2.dilate(arm.astype(np.uint8), disc(ARM_RIM * size)) > 0
+    thick = cv2.morphologyEx(behind.astype(np.uint8), cv2.MORPH_OPEN, disc(FINGER * size)) > 0
+    slivers[around] = near & behind & ~thick
+    return slivers
 
 
 def find_strange_rim(

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from motion_transfer.drawing.engines.around import continue_patterns
 from motion_transfer.drawing.engines.crotch import clothe_crotch
+from motion_transfer.drawing.engines.hues import keep_hues
 from motion_transfer.drawing.engines.interface import FeatureMap, Guess
-from motion_transfer.drawing.engines.limbs import go_around_limbs
 from motion_transfer.drawing.engines.neck import close_neck
 from motion_transfer.drawing.engines.seam import join_halves
 from motion_transfer.drawing.hidden import show_hidden
@@ -23,7 +23,7 @@ Amendment = Callable[[Guess], None]
 
 BY_PLACE: tuple[Amendment, ...] = (
     clothe_crotch,
-    go_around_limbs,
+    keep_hues,
     join_halves,
     close_neck,
 )

@@ -111,6 +111,21 @@ def test_fingers_beyond_a_hands_outline_are_no_clothes() -> None:
     np.testing.assert_array_equal(plain, iuv)
 
 
+def test_slivers_between_fingers_go() -> None:
+    """They are as blue as the cloth, and in a light of their own; a seam farther away stays."""
+    trunk, hand = 2, 4
+    iuv = np.full((160, 160, 3), (trunk, 99, 99), np.uint8)
+    for left in range(50, 90, 10):
+        iuv[50:110, left : left + 8, 0] = hand
+    iuv[:, 140:142] = 0
+    trimmed = trim_around_arms(np.full_like(iuv, 70), iuv)[..., 0]
+    between = np.zeros((160, 160), bool)
+    between[50:110, 50:88] = iuv[50:110, 50:88, 0] == trunk
+    assert between.sum() == 3 * 2 * 60
+    assert trimmed[between].mean() < 0.1 * trunk
+    np.testing.assert_array_equal(trimmed[~between], iuv[~between][:, 0])
+
+
 def test_the_skin_between_a_sleeve_and_a_forearm_stays() -> None:
     iuv = np.zeros((120, 60, 3), np.uint8)
     iuv[10:50, 20:40, 0], iuv[50:110, 20:40, 0] = 18, 20  # an upper arm, its forearm

@@ -1,4 +1,4 @@
-"""Hidden sides of arms and legs: they get the hue of what is seen around them."""
+"""Hidden sides get the hue of what is seen around them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from motion_transfer.drawing.engines.guesses import amend_guesses
+from motion_transfer.drawing.engines.hues import LIGHT, find_pieces, keep_hues, to_levels
 from motion_transfer.drawing.engines.interface import FeatureMap
-from motion_transfer.drawing.engines.limbs import LIGHT, find_limbs, go_around_limbs, to_levels
 from motion_transfer.drawing.source import Source
+from motion_transfer.drawing.textures import differ_in_any_light
 from nhrr_core import PART_GROUPS, load_uv_tables
 
 SIZE = 256
@@ -48,7 +49,7 @@ def amended(guessed: np.ndarray, worn: np.ndarray, shown: np.ndarray) -> np.ndar
     features = np.zeros((1, 16, SIZE, SIZE), np.float32)
     features[0, :3] = guessed
     guess = FeatureMap(features, np.zeros((1, 3, 4 * SIZE, 4 * SIZE), np.float32))
-    after = amend_guesses(guess, source(worn, shown), [go_around_limbs]).features[0]
+    after = amend_guesses(guess, source(worn, shown), [keep_hues]).features[0]
     assert not after[3:].any(), "what are no colours stays"
     assert (after[:3, shown] == guessed[:, shown]).all(), "and so does what is seen"
     return after[:3]
@@ -93,10 +94,26 @@ def test_the_guess_stays(worn: np.ndarray, shown: np.ndarray) -> None:
     assert changed.mean() < 0.002, "but for a texel whose surroundings are of one colour by chance"
 
 
-def test_limbs_are_four_tubes_of_their_own() -> None:
-    limbs = find_limbs(64)
-    assert len(limbs) == 4
-    texels = np.concatenate([limb.texels for limb in limbs])
+def test_a_trunk_has_the_hue_of_what_is_seen_near_alone() -> None:
+    """A hand lies before a shirt: there it is a shirt, and its back is what it was."""
+    trunk = np.isin(TABLES.part, PART_GROUPS["torso"])
+    x, y, z = np.moveaxis(TABLES.position, -1, 0)
+    front = trunk & (z > 0.05)
+    hand = front & (np.abs(x - 0.05) < 0.03) & (np.abs(y - np.median(y[front])) < 0.03)
+    back = trunk & (z < -0.06)
+    assert min(hand.sum(), back.sum()) > 100
+    guess, worn = paint((trunk, BROWN)), paint((trunk, RED))
+    after = amended(guess, worn, front & ~hand)
+    assert (
+        differ_in_any_light(to_levels(after[:, hand]), to_levels(worn[:, hand]), LIGHT).max() < 0.02
+    )
+    np.testing.assert_array_equal(after[:, back], guess[:, back])
+
+
+def test_the_pieces_are_limbs_and_trunk_without_a_texel_in_two() -> None:
+    pieces = find_pieces(64)
+    assert len(pieces) == 5
+    texels = np.concatenate([piece.texels for piece in pieces])
     assert len(np.unique(texels)) == len(texels)
-    for limb, metres in zip(limbs, (0.5, 0.5, 0.79, 0.79), strict=True):
-        assert np.ptp(limb.places[:, limb.axis]) / 4 == pytest.approx(metres, abs=0.04)
+    for piece, metres in zip(pieces, (0.5, 0.5, 0.79, 0.79, 0.65), strict=True):
+        assert np.ptp(piece.places[:, piece.axis]) / 4 == pytest.approx(metres, abs=0.04)
