@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float32, Int64
+from jaxtyping import Float32, Int64
 
 from motion_transfer.drawing.engines.interface import Guess
 from motion_transfer.drawing.textures import (
@@ -74,10 +74,15 @@ def keep_hues(guess: Guess) -> None:
         seen &= np.cumsum(seen) % EVERY == 0
         if np.count_nonzero(seen) < FEWEST:
             continue
-        texels = piece.texels[asked]
-        around, told = _average_around(
-            piece, seen, asked, to_levels(texture[:, piece.texels[seen]])
-        )
+        known, wanted = piece.places[seen], piece.places[asked]
+        away, index = nearest_points(known, wanted, AROUND)
+        near = away[:, 0] < piece.reach
+        texels, away, index = piece.texels[asked][near], away[near], index[near]
+        around, told = _average(to_levels(texture[:, piece.texels[seen]])[:, index], away)
+        along = np.abs(known[index[:, 0], piece.axis] - wanted[near, piece.axis]) / ALONG
+        told *= along < FARTHEST_METRES
+        if np.isfinite(piece.reach):
+            told *= fall(away[:, 0], piece.reach / 2, piece.reach)
         own = to_levels(colours[:, texels])
         change = around * light_between(own, around, LIGHT) - own
         share = hidden[texels] * told * (1 - fall(np.abs(change).max(0), ALIKE, APART))
@@ -89,30 +94,21 @@ def to_levels(colours: Float32[np.ndarray, "3 N"]) -> Float32[np.ndarray, "3 N"]
     return (colours + 1) / 2
 
 
-def _average_around(
-    piece: Piece,
-    seen: Bool[np.ndarray, " N"],
-    asked: Bool[np.ndarray, " N"],
-    levels: Float32[np.ndarray, "3 S"],
-) -> tuple[Float32[np.ndarray, "3 M"], Float32[np.ndarray, " M"]]:
-    """Average the colours of what is seen around each texel that is asked for.
+def _average(
+    levels: Float32[np.ndarray, "3 N K"], away: Float32[np.ndarray, "N K"]
+) -> tuple[Float32[np.ndarray, "3 N"], Float32[np.ndarray, " N"]]:
+    """Average colours, those that are near more than others.
 
     Args:
-        levels: The colours of the seen texels, 0 to 1.
-    Returns: The means, and how much they tell, 0 to 1: little where there are several colours.
+        levels: 0 to 1.
+        away: How far each of them is, metres.
+    Returns: The means, and how much they tell, 0 to 1: little of several colours.
     """
-    known, wanted = piece.places[seen], piece.places[asked]
-    away, index = nearest_points(known, wanted, AROUND)
     weights = np.square(away + np.float32(BLUNT_METRES)) ** -1
     weights /= weights.sum(1, keepdims=True)
-    near = levels[:, index]
-    means = (near * weights).sum(2)
-    variety = (differ_in_any_light(near, means[..., None], ANY_LIGHT) * weights).sum(1)
-    told = fall(variety, PLAIN, PATTERNED)
-    if np.isfinite(piece.reach):
-        told *= fall(away[:, 0], piece.reach / 2, piece.reach)
-    gap = np.abs(known[index[:, 0], piece.axis] - wanted[:, piece.axis]) / ALONG
-    return means, told * (gap < FARTHEST_METRES)
+    means = (levels * weights).sum(2)
+    variety = (differ_in_any_light(levels, means[..., None], ANY_LIGHT) * weights).sum(1)
+    return means, fall(variety, PLAIN, PATTERNED)
 
 
 @lru_cache(maxsize=2)
