@@ -264,6 +264,16 @@ def parse_frames(text: str | int) -> tuple[int | None, int | None]:
     return parse_range(str(text), "frames")
 
 
+def frame_range(frames: tuple[int | None, int | None], count: int, where: str) -> range:
+    """Tell the frames of a clip that are asked for. Raises: InputError if it lacks some of them."""
+    start, stop = frames[0] or 0, count if frames[1] is None else frames[1]
+    if not 0 <= start < stop <= count:
+        raise InputError(
+            f"frames {start}:{stop} asked for, but {where} has {count}: 0:{count} at most"
+        )
+    return range(start, stop)
+
+
 def parse_rate(text: str | float) -> Fraction:
     """Read a rate in frames per second: `25`, `29.97` or `30000/1001`. Raises: InputError."""
     try:

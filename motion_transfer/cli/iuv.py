@@ -13,7 +13,7 @@ from motion_transfer.cli.options import FILE, CommandGroup, SectionCommand, add_
 from motion_transfer.cli.progress import CountBar
 from motion_transfer.cli.terminal import counted, note, tell
 from motion_transfer.estimate.opening import ESTIMATORS
-from motion_transfer.option import parse_rate
+from motion_transfer.option import parse_frames, parse_rate
 
 input_option = section("Input")
 estimate_option = section("Estimator")
@@ -105,6 +105,9 @@ def iuv() -> None:
     metavar="hold|background|fail",
     help="Frames in which nobody is found: repeat the frame before, background (default), or stop.",
 )
+@input_option(
+    "--frames", default=":", metavar="A:B", help="Only these frames, counted from 0, B excluded."
+)
 @output_option(
     "--alpha",
     is_flag=True,
@@ -112,7 +115,7 @@ def iuv() -> None:
     " dance_alpha.mkv.",
 )
 @add_options(OUTPUT_OPTIONS)
-def estimate(output: Path, fps: str | None, quiet: bool, **options: Any) -> None:
+def estimate(output: Path, fps: str | None, frames: str, quiet: bool, **options: Any) -> None:
     """Find the people of raw pictures and write their IUV.
 
     Photos are turned upright as their EXIF says, videos as their rotation flag says. A video's
@@ -121,7 +124,7 @@ def estimate(output: Path, fps: str | None, quiet: bool, **options: Any) -> None
 
     \b
     mt iuv me.jpg -o me_IUV.png
-    mt iuv dance.mp4 -o dance.mkv --person largest
+    mt iuv dance.mp4 -o dance.mkv --person largest --frames 0:300
     mt iuv dance.mp4 -o dance_iuv/ --estimator densepose --model densepose.pt
     mt iuv me.jpg -o me_IUV.png --alpha
     """
@@ -129,15 +132,20 @@ def estimate(output: Path, fps: str | None, quiet: bool, **options: Any) -> None
     from motion_transfer.media.iuv.writing import name_alpha
     from motion_transfer.render.plan import list_stretches
 
-    settings = EstimateOptions(output=output, frame_rate=_rate(fps), **options)
+    settings = EstimateOptions(
+        output=output, frame_rate=_rate(fps), frames=parse_frames(frames), **options
+    )
     with CountBar("finding people", unit="frame", quiet=quiet) as bar:
         report = estimate_iuv(settings, bar.advance)
     seen, notes = report.summary, list(report.notes)
+    start = settings.frames[0] or 0
     if seen.empty:
         shown = {"hold": "the frame before", "background": "background only"}[settings.missing]
-        times = list_stretches(seen.empty, 0, report.frame_rate)
+        empty = [(start + first, start + end) for first, end in seen.empty]
+        times = list_stretches(empty, start, report.frame_rate)
         notes.append(f"nobody found in {counted(seen.empty_count, 'frame')}, {shown}: {times}")
-    shots = f", {len(seen.shots)} shots" if len(seen.shots) > 1 else ""
+    cuts = sum(shot > start for shot in seen.shots)
+    shots = f", {cuts + 1} shots" if cuts else ""
     people = f", up to {seen.most_people} people" if seen.most_people > 1 else ""
     written = f"{output} and {name_alpha(output)}" if settings.alpha else output
     _report(quiet, notes, f"wrote {written}: {counted(seen.frame_count, 'frame')}{shots}{people}")

@@ -47,8 +47,8 @@ class ClipSummary:
     """What was seen, as far as the clip was read.
 
     Attributes:
-        shots: The frames with which shots begin.
-        empty: Half-open ranges of frames in which nobody was found.
+        shots: The frames of the clip with which shots begin.
+        empty: Half-open ranges of the chosen frames in which nobody was found.
         most_people: How many were found in one frame, at most.
     """
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import get_args
 
@@ -18,6 +19,7 @@ from motion_transfer.media.iuv.formats import ChannelOrder
 from motion_transfer.media.iuv.writing import VIDEO_RATE, IuvOutput, check_iuv_output, write_iuv
 from motion_transfer.media.pictures.formats import open_pictures
 from motion_transfer.media.unchanged import Inputs
+from motion_transfer.option import frame_range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +32,7 @@ class EstimateOptions:
         model: The file of the `densepose` estimator.
         person: `all`, `largest`, an index from the left, or a box `x0,y0,x1,y1` in px.
         missing: What frames show in which nobody is found; see `estimate_clip`.
+        frames: The half-open range of frames that is wanted, either end open.
         output_order: The channel order to write, for pictures and video.
         frame_rate: A video's; None means the source's, or 30.
         alpha: Whether to write the people's alpha beside the IUV, see `name_alpha`.
@@ -41,6 +44,7 @@ class EstimateOptions:
     model: Path | None = None
     person: str = EVERYBODY
     missing: MissingPeople = "background"
+    frames: tuple[int | None, int | None] = (None, None)
     output_order: ChannelOrder = "vui"
     frame_rate: Fraction | None = None
     force: bool = False
@@ -72,16 +76,17 @@ def estimate_iuv(
     """Write the IUV of raw pictures of any length.
 
     Args:
-        done: Called with 1 and the number of all frames after each frame.
+        done: Called with 1 and the number of all chosen frames after each of them.
         estimator: One that is ready; None opens the one that the options name.
     Raises: InputError and its kinds, also for a source that changes meanwhile; nothing half-written
         stays behind.
     """
     inputs = Inputs(filter(None, (options.source, options.model)))
     pictures = open_pictures(options.source)
+    chosen = frame_range(options.frames, pictures.frame_count, str(options.source))
     rate = options.frame_rate or pictures.frame_rate
     settings = IuvOutput(
-        frame_count=pictures.frame_count,
+        frame_count=len(chosen),
         height=pictures.height,
         width=pictures.width,
         order=options.output_order,
@@ -103,14 +108,15 @@ def estimate_iuv(
         estimator,
         person=options.person,
         missing=options.missing,
+        chosen=chosen,
         summary=summary,
         with_alpha=options.alpha,
     )
     with closing(frames):
         write_iuv(
-            inputs.guard(frames),
+            inputs.guard(islice(frames, chosen.start, None)),
             options.output,
             settings,
-            lambda count: done(count, pictures.frame_count),
+            lambda count: done(count, len(chosen)),
         )
     return EstimateReport(summary, rate or VIDEO_RATE, pictures.notes)

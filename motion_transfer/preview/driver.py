@@ -18,6 +18,7 @@ from jaxtyping import UInt8
 from motion_transfer.drawing.person import People, Person, find_again
 from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError
+from motion_transfer.option import frame_range
 from motion_transfer.preview.queue import ByteCache
 from motion_transfer.render.composition import plan_run
 from motion_transfer.render.driver import Driver
@@ -28,7 +29,6 @@ from motion_transfer.render.plan import (
     SeenFrame,
     Shot,
     digest_of_iuv,
-    frame_range,
 )
 
 BLOCK_FRAMES = 16  # decoded in one go: half a second of playing

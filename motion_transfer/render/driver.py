@@ -22,6 +22,7 @@ from motion_transfer.media.iuv.formats import ChannelOrder, Missing, names_file
 from motion_transfer.media.iuv.opening import open_reader, open_stream
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.unchanged import Inputs
+from motion_transfer.option import frame_range
 from motion_transfer.people import is_motion
 from motion_transfer.render.crew import Crew, result_of
 from motion_transfer.render.inputs import motion_files
@@ -29,7 +30,6 @@ from motion_transfer.render.options import InputOptions
 from motion_transfer.render.plan import (
     CHUNK_FRAMES,
     SeenFrame,
-    frame_range,
     look_through,
     scan_people,
 )

@@ -28,7 +28,7 @@ from motion_transfer.media.iuv.opening import open_reader
 from motion_transfer.media.iuv.stream import IuvReader
 from motion_transfer.media.pictures.photo import Photo
 from motion_transfer.media.unchanged import Inputs
-from motion_transfer.option import parse_frames, parse_path, parse_rate
+from motion_transfer.option import frame_range, parse_frames, parse_path, parse_rate
 from motion_transfer.render.composition import (
     Scene,
     open_canvas,
@@ -46,7 +46,7 @@ from motion_transfer.render.options import (
     RenderOptions,
     SourceOptions,
 )
-from motion_transfer.render.plan import frame_range, scan_people
+from motion_transfer.render.plan import scan_people
 from motion_transfer.render.source import check_photos, check_visible, clothe_legs, read_source
 from motion_transfer.render.source_pictures import estimate_person, show_estimate
 from motion_transfer.weights import DEFAULT_WEIGHTS, find_pretrained

@@ -42,10 +42,11 @@ from motion_transfer.media.pictures.stream import PictureStream
 from motion_transfer.media.publish import publish
 from motion_transfer.media.unchanged import Inputs
 from motion_transfer.media.work import digest_of
+from motion_transfer.option import frame_range
 from motion_transfer.render.content import driver_key
 from motion_transfer.render.inputs import is_clip
 from motion_transfer.render.options import InputOptions, SourceOptions, is_kept
-from motion_transfer.render.plan import frame_range, list_stretches
+from motion_transfer.render.plan import list_stretches
 
 if TYPE_CHECKING:
     from motion_transfer.tracking import Track

@@ -142,16 +142,6 @@ class DriverPlan:
         return missing_stretches(self.frames, self.first)
 
 
-def frame_range(frames: tuple[int | None, int | None], count: int, where: str) -> range:
-    """Tell the driver's frames that a run uses. Raises: InputError if it has none of them."""
-    start, stop = frames[0] or 0, count if frames[1] is None else frames[1]
-    if not 0 <= start < stop <= count:
-        raise InputError(
-            f"frames {start}:{stop} asked for, but {where} has {count}: 0:{count} at most"
-        )
-    return range(start, stop)
-
-
 def scan_people(
     reader: IuvReader,
     frames: range,

@@ -84,6 +84,25 @@ def test_a_video_with_gaps(tmp_path: Path, mt, red, output: str) -> None:
         assert open_stream(tmp_path / output).frame_rate == Fraction(30000, 1001)
 
 
+@pytest.mark.parametrize("output", ["iuv", "iuv.mkv", "iuv.npy"])
+def test_some_frames_of_a_video(tmp_path: Path, mt, red, output: str) -> None:
+    """As they are in the whole clip's; what nobody is in is told by its place in the clip."""
+    frames = [somebody(i) for i in range(12)]
+    frames[1] = frames[6] = scene(size=SIZE)
+    video = film(tmp_path / "dance.mp4", frames)
+    whole, part = tmp_path / "whole.npy", tmp_path / output
+    assert mt("iuv", video, "-o", whole, *red).code == 0
+    outcome = mt("iuv", video, "-o", part, *red, "--frames", "4:9")
+    assert outcome.code == 0, outcome.err
+    assert "nobody found in 1 frame, background only" in outcome.err
+    assert "(frames 6:7)" in outcome.err
+    np.testing.assert_array_equal(np.stack(frames_of(part)), np.load(whole)[4:9])
+    refused = mt("iuv", video, "-o", tmp_path / "more.npy", *red, "--frames", "4:13")
+    assert refused.code == 2
+    assert "frames 4:13 asked for, but" in refused.err and "has 12: 0:12 at most" in refused.err
+    assert not (tmp_path / "more.npy").exists()
+
+
 def alpha_of(path: Path) -> list[np.ndarray]:
     """The frames of an alpha folder, picture, video or stack."""
     if path.suffix == ".npy":

@@ -18,7 +18,7 @@ from motion_transfer.drawing.person import Box, People, Person, find_again
 from motion_transfer.drawing.window import Window, plan_window
 from motion_transfer.media.folders import natural_key
 from motion_transfer.media.iuv.opening import open_reader, open_stream
-from motion_transfer.option import parse_frames, parse_rate
+from motion_transfer.option import frame_range, parse_frames, parse_rate
 from motion_transfer.render.options import parse_parts
 from motion_transfer.render.plan import (
     CHUNK_FRAMES,
@@ -26,7 +26,6 @@ from motion_transfer.render.plan import (
     DriverPlan,
     FramePlan,
     Shot,
-    frame_range,
 )
 from nhrr_core import PART_GROUPS, PART_NAMES
 

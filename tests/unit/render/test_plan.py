@@ -11,12 +11,12 @@ from motion_transfer.drawing.person import Box, People, Person
 from motion_transfer.drawing.window import Window
 from motion_transfer.errors import InputError
 from motion_transfer.media.iuv.opening import open_reader, open_stream
+from motion_transfer.option import frame_range
 from motion_transfer.render.plan import (
     CHUNK_FRAMES,
     DriverPlan,
     FramePlan,
     SeenFrame,
-    frame_range,
     list_stretches,
     plan_path,
     scan_people,
