@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from importlib import import_module
 
-__version__ = "0.6.1"
+__version__ = "0.7.0"
 
 MODULES = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL"}
 """What a package is imported as, where it is installed under several names or another than that."""
