@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
 from motion_transfer.drawing.textures import differ_in_any_light
-from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
-from nhrr_core import PART_GROUPS, load_uv_tables
+from motion_transfer.drawing.unfolding import find_positions
+from nhrr_core import PART_GROUPS
 
 FEWEST_PIXELS = 60  # of upper arms, forearms, and the top of a head; fewer tell nothing
 CROWN, CHIN, BROW = 0.5, 0.38, 0.47  # metres: hair grows higher up; a face, see `UVTables.position`
@@ -36,7 +36,7 @@ def trim_strands(
         np.isin(iuv[..., 0], PART_GROUPS[name]) for name in ("upper-arms", "lower-arms", "head")
     )
     colours = rgb[head]
-    place = _positions(iuv[head])
+    place = find_positions(iuv[head])
     crown = place[:, 1] > CROWN
     face = (place[:, 1] > CHIN) & (place[:, 1] < BROW) & (place[:, 2] > CHEEKS_METRES)
     if min(map(np.count_nonzero, (arms, forearms, crown))) < FEWEST_PIXELS:
@@ -49,7 +49,7 @@ def trim_strands(
         skin = np.concatenate([skin, of_face], 1)
     levels = rgb[arms].T / np.float32(255)
     from_skin = _apart(levels, skin, SKIN_LIGHT)
-    if not _are_bare(_positions(iuv[arms]), from_skin < SKIN):
+    if not _are_bare(find_positions(iuv[arms]), from_skin < SKIN):
         return iuv
     from_hair = _apart(levels, _shades(colours[crown]), ANY_LIGHT)
     hair = np.zeros(arms.shape, np.uint8)
@@ -59,19 +59,11 @@ def trim_strands(
     return iuv * ~(arms & (hair > 0))[..., None]
 
 
-def _positions(iuv: UInt8[np.ndarray, "N 3"]) -> Places:
-    """Where pixels lie on the body, metres, see `UVTables.position`."""
-    positions = load_uv_tables().position
-    texels = texel_index(texture_coordinates(iuv), len(positions))
-    return positions.reshape(-1, 3)[texels]
-
-
 def _shades(rgb: UInt8[np.ndarray, "N 3"]) -> Shades:
     """Give the dark, the medium and the bright colour of pixels: the medians of their thirds."""
     ordered = rgb[np.argsort(rgb.sum(1, dtype=int))]
-    return np.stack([np.median(third, 0) for third in np.array_split(ordered, 3)], 1) / np.float32(
-        255
-    )
+    medians = [np.median(third, 0) for third in np.array_split(ordered, 3)]
+    return np.stack(medians, 1).astype(np.float32) / 255
 
 
 def _apart(
@@ -86,5 +78,5 @@ def _are_bare(places: Places, is_skin: Bool[np.ndarray, " N"]) -> bool:
     """Tell whether all along upper arms, both taken as one, some of what is seen is skin."""
     along = (np.abs(places[:, 0]) - SHOULDER) / (ELBOW - SHOULDER) * STRETCHES
     stretch = along.astype(int).clip(0, STRETCHES - 1)
-    seen, skin = (np.bincount(stretch, each, STRETCHES) for each in (is_skin**0, is_skin))
+    seen, skin = (np.bincount(each, minlength=STRETCHES) for each in (stretch, stretch[is_skin]))
     return bool(np.all((skin >= BARE_SHARE * seen) | (seen < FEWEST_OF_STRETCH)))

@@ -6,15 +6,15 @@ import math
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float32, UInt8
+from jaxtyping import Bool, UInt8
 
 from motion_transfer.drawing.outline import grab_cut
 from motion_transfer.drawing.person import bounding_box, disc, occupancy
 from motion_transfer.drawing.strands import trim_strands
-from motion_transfer.drawing.unfolding import texel_index, texture_coordinates
+from motion_transfer.drawing.unfolding import find_positions
 from motion_transfer.drawing.views import HEAD
 from motion_transfer.media.nearest import take_nearest
-from nhrr_core import PART_GROUPS, load_uv_tables
+from nhrr_core import PART_GROUPS
 from nhrr_core.parts import FOREARMS
 
 ARMS = [(hand, *forearm) for hand, forearm in FOREARMS.items()]
@@ -54,7 +54,7 @@ def trim_head(
     Only what lies lower than the mouth is doubted.
     """
     doubted = find_strange_rim(rgb, np.isin(iuv[..., 0], HEAD), HEAD_RIM, HEAD_LEVELS)
-    doubted[doubted] = _heights(iuv[doubted]) < MOUTH_METRES
+    doubted[doubted] = find_positions(iuv[doubted])[:, 1] < MOUTH_METRES
     return iuv * ~doubted[..., None]
 
 
@@ -152,12 +152,6 @@ def _cut_around(mask: Bool[np.ndarray, "H W"], margin: int) -> tuple[slice, slic
     ends = (top, tall), (left, wide)
     down, across = (slice(max(0, at - margin), at + long + margin) for at, long in ends)
     return down, across
-
-
-def _heights(iuv: UInt8[np.ndarray, "N 3"]) -> Float32[np.ndarray, " N"]:
-    """How high each pixel lies on the body, metres, see `UVTables.position`."""
-    heights = load_uv_tables().position[..., 1]
-    return heights.ravel()[texel_index(texture_coordinates(iuv), len(heights))]
 
 
 def trim_to_alpha(

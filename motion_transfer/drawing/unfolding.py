@@ -123,6 +123,13 @@ def texel_index(place: Float32[np.ndarray, "2 ..."], size: int) -> Int64[np.ndar
     return row
 
 
+def find_positions(iuv: UInt8[np.ndarray, "N 3"]) -> Float32[np.ndarray, "N 3"]:
+    """Look up where pixels lie on the layout's body, metres, see `UVTables.position`."""
+    positions = load_uv_tables().position
+    texels = texel_index(texture_coordinates(iuv), len(positions))
+    return positions.reshape(-1, 3)[texels]
+
+
 def keep_parts(
     iuv: UInt8[np.ndarray, "H W 3"], parts: tuple[int, ...]
 ) -> UInt8[np.ndarray, "H W 3"]:
