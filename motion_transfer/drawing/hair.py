@@ -1,8 +1,9 @@
-"""Long hair, on the neck that it covers where no photo shows it.
+"""Long hair: on the neck that it covers where no photo shows it, and beside the neck.
 
 Hair beside a neck lies off the body, and a texture has no place for it: whoever turned around had
-short hair. So where a photo shows hair from the ears down, beside the jaw and farther, the hidden
-sides of neck and head get its colour, as far down as it reaches.
+short hair, and from the front it was drawn in the colours of neck and shoulders. So where a photo
+shows hair from the ears down, beside the jaw and farther, the hidden sides of neck and head get its
+colour, as far down as it reaches, and so does what is drawn beside them.
 """
 
 from __future__ import annotations
@@ -12,12 +13,17 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float32, Int64
+from jaxtyping import Bool, Float32, Int64, UInt8
 
 from motion_transfer.drawing.person import COVERS, bounding_box, occupancy
 from motion_transfer.drawing.source import Source, paint
 from motion_transfer.drawing.textures import differ_in_any_light
-from motion_transfer.drawing.unfolding import keep_parts, texel_index, texture_coordinates
+from motion_transfer.drawing.unfolding import (
+    find_positions,
+    keep_parts,
+    texel_index,
+    texture_coordinates,
+)
 from motion_transfer.media.nearest import nearest_pixels
 from nhrr_core import PART_GROUPS, load_uv_tables
 
@@ -36,31 +42,94 @@ SAME_HAIR, SHADES = 0.16, (0.5, 2.0)  # of 1, in the channel that differs most, 
 MOSTLY = 0.6  # of the pixels of a row
 SPREAD = 2.5  # rows: the standard deviation of a Gaussian over which colours are averaged
 
+REACH, SOFT = 0.5, 0.025  # of the root of a head's area: hair beside it, and how softly it begins
 BEHIND_METRES = 0.02  # forward: what is hidden farther in front is not behind hair
+ASIDE_METRES = 0.03  # from the middle: what is farther in front is throat and chin
 MIDDLE_METRES = 0.05  # from the nape, where hair of both sides meets
+
+
+class Hair(NamedTuple):
+    """Long hair beside a neck, by the body's side, the right one first, and row, see `Neck`.
+
+    Attributes:
+        colours: 0 to 1.
+        hangs: Where it does.
+    """
+
+    colours: Float32[np.ndarray, "3 2 R"]
+    hangs: Bool[np.ndarray, "2 R"]
+
+
+def find_hair(source: Source) -> Hair | None:
+    """Find the long hair of a person; None: it is short, or nothing tells.
+
+    Only the first photo is looked at, as its pixels alone are at hand, and only if it is known
+    where the person ends.
+    """
+    strands = _look_for_strands(source)
+    hangs = None if strands is None else _measure_length(strands)
+    if strands is None or hangs is None:
+        return None
+    return Hair(_average(strands, hangs), hangs)
 
 
 def lay_hair(source: Source) -> Source:
     """Show long hair on the hidden neck of whoever has it; others pass as they are.
 
-    What is painted counts as seen, as in `clothe_back`. Only the first photo is looked at, as its
-    pixels alone are at hand, and only if it is known where the person ends.
+    What is painted counts as seen, as in `clothe_back`.
     """
-    strands = _look_for_strands(source)
-    hangs = None if strands is None else _measure_length(strands)
-    if strands is None or hangs is None:
+    hair = find_hair(source)
+    if hair is None:
         return source
+    colours, hangs = hair
     neck = find_neck()
-    colours = _average(strands, hangs)
     own, others = (colours[:, side, neck.row] for side in (neck.side, 1 - neck.side))
     behind = neck.position[:, 2] < BEHIND_METRES
     both = hangs[0] & hangs[1]
     covered = hangs[neck.side, neck.row] & (both[neck.row] | (neck.off == 1))
     painted = np.zeros((SIZE, SIZE), bool)
     painted.reshape(-1)[neck.texels[covered & behind]] = True
-    hair = np.zeros((3, SIZE, SIZE), np.float32)
-    hair.reshape(3, -1)[:, neck.texels] = (own + (others - own) * (1 - neck.off) / 2) * 2 - 1
-    return paint(source, hair, painted)
+    texture = np.zeros((3, SIZE, SIZE), np.float32)
+    texture.reshape(3, -1)[:, neck.texels] = (own + (others - own) * (1 - neck.off) / 2) * 2 - 1
+    return paint(source, texture, painted)
+
+
+def colour_hair(
+    picture: UInt8[np.ndarray, "S S 4"], iuv: UInt8[np.ndarray, "S S 3"], hair: Hair
+) -> None:
+    """Give what is drawn beside neck and lower head the colour of the hair that hangs there.
+
+    Args:
+        picture: What a network draws, changed in place; what it covers stays.
+        iuv: What it was drawn for.
+    """
+    head = np.isin(iuv[..., 0], PART_GROUPS["head"])
+    size = np.count_nonzero(head) ** 0.5
+    head[head] = _is_low(find_positions(iuv[head]))
+    box = bounding_box(iuv * head[..., None])
+    if not box.area:
+        return
+    near = box.grown(round(size * REACH)).slices
+    body = occupancy(iuv[near]) > 0
+    beside = ~body & (picture[near][..., 3] > 0)
+    outline = iuv[near].reshape(-1, 3)[nearest_pixels(body)[1][beside]]
+    place = find_positions(outline)
+    row, side = _row(place), (place[:, 0] > 0).astype(np.int64)
+    own = np.isin(outline[:, 0], PART_GROUPS["head"]) & hair.hangs[side, row]
+    own &= _is_low(place)
+    own &= (np.abs(place[:, 0]) > ASIDE_METRES) | (place[:, 2] < BEHIND_METRES)  # not at the throat
+    if not own.any():
+        return
+    covered = np.zeros(body.shape, np.float32)
+    covered[beside] = own
+    blur, every = (
+        cv2.GaussianBlur(each, (0, 0), size * SOFT)[beside]
+        for each in (covered, beside.astype(np.float32))
+    )
+    share = (blur / every)[:, None]
+    drawn = picture[near][..., :3][beside].astype(np.float32)
+    drawn += (hair.colours[:, side, row].T * 255 - drawn) * share
+    picture[near][..., :3][beside] = np.rint(drawn).astype(np.uint8)
 
 
 class Neck(NamedTuple):
@@ -181,3 +250,8 @@ def _average(strands: Strands, hangs: Bool[np.ndarray, "2 R"]) -> Float32[np.nda
 
 def _row(position: Float32[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
     return ((position[:, 1] - LOWEST) / ROW).astype(np.int64).clip(0, ROWS - 1)
+
+
+def _is_low(position: Float32[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+    """Tell what belongs to the neck or, of a head, lies no higher than its ears."""
+    return (position[:, 1] > LOWEST) & (position[:, 1] < HIGHEST)

@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
+from motion_transfer.drawing.hair import Hair
 from motion_transfer.drawing.source import Source
 from nhrr_core.config import ModelConfig
 
@@ -32,10 +33,12 @@ class FeatureMap:
         features: The paper's feature map, and what is carried with it.
         detail: What the photos show finer: added to the first three channels where they are looked
             up, see `nhrr_core.NeuralReRenderer.detail`; None where a model has no use for it.
+        hair: Long hair beside the neck, of which a texture knows nothing; None where there is none.
     """
 
     features: Float[np.ndarray, "1 D T T"]
     detail: Float[np.ndarray, "1 3 t t"] | None = None
+    hair: Hair | None = None
 
 
 @dataclass(frozen=True)

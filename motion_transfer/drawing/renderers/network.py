@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from jaxtyping import Float, UInt8
 
 from motion_transfer.drawing.engines import Execution, Wish, choose_execution, open_engine
 from motion_transfer.drawing.engines.interface import Engine, FeatureMap, Occupied
+from motion_transfer.drawing.hair import colour_hair, find_hair
 from motion_transfer.drawing.kept_source import load_features
 from motion_transfer.drawing.person import disc, occupancy
 from motion_transfer.drawing.renderers.interface import Appearance
@@ -78,11 +79,11 @@ class NetworkRecipe:
         _open_network(self).prepare({self.working_size(side) for side in window_sides})
 
     def appearance_of(self, source: Source) -> FeatureMap:
-        if source.kept is not None:
-            config = inspect_checkpoint(self.weights).config
-            if (kept := load_features(source.kept, self.content, config)) is not None:
-                return kept
-        return _open_network(self).encode(source)
+        config = inspect_checkpoint(self.weights).config
+        known = source.kept and load_features(source.kept, self.content, config)
+        known = known or _open_network(self).encode(source)
+        # a model that is told what stands off the body draws hair there
+        return replace(known, hair=find_hair(source)) if config.clearance else known
 
     def renderer(self, appearance: Appearance) -> NeuralRenderer:
         assert isinstance(appearance, FeatureMap)
@@ -131,6 +132,7 @@ class NeuralRenderer:
     def __init__(self, engine: Engine, appearance: FeatureMap) -> None:
         self._engine = engine
         self._feature_map = engine.take(appearance)
+        self._hair = appearance.hair
         self.occupies: Occupied = engine.occupies
         self.feature_channels = engine.config.feature_outputs
 
@@ -146,9 +148,19 @@ class NeuralRenderer:
     def render(self, iuv: UInt8[np.ndarray, "B S S 3"]) -> UInt8[np.ndarray, "B S S 4"]:
         images = self._engine.draw(self._feature_map, iuv)
         if images.shape[-1] == 4:
-            return images
+            return self._with_hair(images, iuv)
         masks = np.stack([grow_mask(crop) for crop in iuv])
         return np.concatenate([images, masks[..., None]], axis=-1)
+
+    def _with_hair(
+        self, images: UInt8[np.ndarray, "B S S 4"], iuv: UInt8[np.ndarray, "B S S 3"]
+    ) -> UInt8[np.ndarray, "B S S 4"]:
+        if self._hair is None:
+            return images
+        images = np.require(images, requirements="W")  # engines may lend memory of their own
+        for image, crop in zip(images, iuv, strict=True):
+            colour_hair(image, crop, self._hair)
+        return images
 
 
 def grow_mask(iuv: UInt8[np.ndarray, "S S 3"]) -> UInt8[np.ndarray, "S S"]:

@@ -1,14 +1,26 @@
-"""Long hair covers the neck of whoever turns around."""
+"""Long hair covers the neck of whoever turns around, and is drawn beside it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from motion_transfer.drawing.hair import HIGHEST, JAW, LOWEST, find_neck, lay_hair
+from motion_transfer.drawing.engines.interface import Engine, FeatureMap
+from motion_transfer.drawing.hair import (
+    HIGHEST,
+    JAW,
+    LOWEST,
+    colour_hair,
+    find_hair,
+    find_neck,
+    lay_hair,
+)
+from motion_transfer.drawing.renderers.network import NeuralRenderer
 from motion_transfer.drawing.source import Source
 from motion_transfer.media.nearest import nearest_points
 from motion_transfer.media.pictures.photo import Photo
@@ -106,3 +118,61 @@ def unknown() -> Source:
 )
 def test_others_pass_as_they_are(source: Source) -> None:
     assert lay_hair(source) is source
+
+
+def drawn(cover: np.ndarray) -> np.ndarray:
+    """What a network draws of IUV: grey off the body, as nothing tells it of hair."""
+    rgb = np.where(BODY[..., None], SKIN, (150, 140, 140))
+    return np.dstack([rgb, cover]).astype(np.uint8)
+
+
+def test_what_is_drawn_beside_a_neck_is_hair_as_far_down_as_it_hangs() -> None:
+    source = portrait(0.33)
+    hair = find_hair(source)
+    assert hair is not None
+    cover = source.photo.alpha
+    assert cover is not None
+    picture = drawn(cover)
+    before = picture.copy()
+    colour_hair(picture, IUV, hair)
+    beside = (cover > 0) & ~BODY
+    hangs = (HEIGHTS > 0.35) & (HEIGHTS < HIGHEST - 0.04)  # softly above and below
+    assert np.abs(picture[beside & hangs[:, None], :3].astype(int) - HAIR).max() <= 6
+    above = (HEIGHTS > HIGHEST + 0.03)[:, None]
+    for stays in (BODY, ~beside, np.broadcast_to(above, BODY.shape)):
+        np.testing.assert_array_equal(picture[stays], before[stays])
+    np.testing.assert_array_equal(picture[..., 3], cover)
+
+
+def test_a_picture_without_a_head_stays() -> None:
+    hair = find_hair(portrait(0.26))
+    assert hair is not None
+    trunk = np.where(IUV[..., :1] > 0, np.uint8([2, 99, 99]), np.uint8(0))
+    picture = drawn(np.full(BODY.shape, 255))
+    before = picture.copy()
+    colour_hair(picture, trunk, hair)
+    np.testing.assert_array_equal(picture, before)
+
+
+def test_a_network_that_is_told_of_hair_draws_it() -> None:
+    """Also where it lends a picture that nobody may write to."""
+    hair = find_hair(portrait(0.26))
+    assert hair is not None
+    lent = drawn(np.full(BODY.shape, 255))[None]
+    lent.setflags(write=False)
+    engine = SimpleNamespace(
+        take=lambda known: known,
+        draw=lambda _known, _iuv: lent,
+        config=SimpleNamespace(feature_outputs=16),
+        occupies="core",
+    )
+    features = np.zeros((1, 16, 4, 4), np.float32)
+    bald, haired = (
+        NeuralRenderer(cast(Engine, engine), FeatureMap(features, hair=told)).render(IUV[None])[0]
+        for told in (None, hair)
+    )
+    np.testing.assert_array_equal(bald, lent[0])
+    expected = lent[0].copy()
+    colour_hair(expected, IUV, hair)
+    np.testing.assert_array_equal(haired, expected)
+    assert (haired != bald).any()
